@@ -1,0 +1,89 @@
+# softgrip: each target is an artifact, each rule one stage. `make help` lists them.
+#
+#   RUN=name       which runs/<name>/run.toml        (default: default)
+#   MESH_DIR=path  folder of meshes for the dataset  (default: the embedded object set)
+#   WORKERS=n      worker processes                  (default: all cores)
+
+RUN     ?= default
+PYTHON3 ?= python3
+R       := runs/$(RUN)
+STATE   := $(R)/.state
+PY      := .venv/bin/python
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.SUFFIXES:
+.NOTPARALLEL:
+
+# Without MESH_DIR, the goals that make a dataset take the embedded objects, and
+# those that use one (train, eval, ...) stay with the meshes it was made from.
+ifeq (,$(filter dataset objects scenes grasps shards,$(MAKECMDGOALS)))
+MESH_DIR := $(or $(MESH_DIR),$(shell cat $(STATE)/mesh_dir 2>/dev/null))
+endif
+export RUN MESH_DIR WORKERS
+ifeq (,$(strip $(MESH_DIR)))
+unexport MESH_DIR
+endif
+ifeq (,$(strip $(WORKERS)))
+unexport WORKERS
+endif
+
+.PHONY: help dataset objects scenes grasps shards train eval evaluate status doctor setup test lint clean FORCE
+
+help:  ## this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
+	@echo "  RUN=ci|default|paper, MESH_DIR=folder of meshes, WORKERS=processes"
+
+dataset: $(R)/shards.mcap  ## objects, scenes, grasps, shards
+	@$(PY) -m stages.graph fresh shards
+train: $(R)/train.mcap  ## GA-CNN on the dataset
+	@$(PY) -m stages.graph fresh train
+eval: $(R)/evaluate.mcap  ## closed-loop success by level
+	@$(PY) -m stages.evaluate --run $(RUN) --table
+
+objects: $(R)/objects.mcap  ## stage 1: meshes to catalogue
+scenes: $(R)/scenes.mcap  ## stage 2: clutter, settled and rendered
+grasps: $(R)/grasps.mcap  ## stage 3: labelled grasps
+shards: $(R)/shards.mcap  ## stage 4: shuffled, split shards
+evaluate: eval
+
+# --- one rule a stage: an artifact is remade when its key file is newer ---
+$(R)/%.mcap: $(STATE)/%.key
+	@$(PY) -m stages.$* --run $(RUN)
+
+# A key file is looked at every time and rewritten only when its digest changed.
+$(STATE)/%.key: .venv/.ready FORCE
+	@$(PY) -m stages.graph key $*
+$(STATE)/scenes.key: $(R)/objects.mcap
+$(STATE)/grasps.key: $(R)/scenes.mcap
+$(STATE)/shards.key: $(R)/grasps.mcap
+$(STATE)/train.key: $(R)/shards.mcap
+$(STATE)/evaluate.key: $(R)/train.mcap
+.PRECIOUS: $(STATE)/%.key $(R)/%.mcap
+FORCE:
+
+status: .venv/.ready  ## what is stale, and why
+	@$(PY) -m stages.graph status
+
+# --- the machine ---
+setup: .venv/.ready  ## virtual environment, pinned packages, Vulkan driver
+.venv/.ready: constraints.txt pyproject.toml
+	@test -x $(PY) || $(PYTHON3) -m venv .venv || \
+	  { echo "No virtual environment could be made: apt-get install python3-venv"; exit 1; }
+	$(PY) -m pip install --quiet --disable-pip-version-check -c constraints.txt --editable '.[test]'
+	@$(PY) -m pipeline.machine.vulkan_driver
+	@touch $@
+
+doctor:  ## what is present, what is missing, how to mend it
+	@$$(test -x $(PY) && echo $(PY) || echo $(PYTHON3)) -m pipeline.machine.doctor
+
+test: .venv/.ready lint  ## lint, types, tests
+	$(PY) -m pytest
+
+lint: .venv/.ready
+	$(PY) -m ruff check .
+	$(PY) -m ruff format --check .
+	$(PY) -m mypy
+	$(PY) -m schemas.generate --check
+
+clean:  ## remove what run RUN produced, keep its run.toml
+	find $(R) -mindepth 1 ! -name run.toml -delete

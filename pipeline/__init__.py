@@ -1,0 +1,1 @@
+"""What the stages of softgrip are made of; imports nothing from ``stages``."""

@@ -1,0 +1,81 @@
+"""Where an artifact comes from: the metadata record every file carries."""
+
+import json
+from dataclasses import asdict, dataclass
+from importlib.metadata import PackageNotFoundError, version
+from typing import Self
+
+from pipeline.errors import ArtifactError
+
+METADATA_NAME = "provenance"
+SCHEMA_VERSION = "softgrip.v1"
+
+
+@dataclass(frozen=True)
+class Input:
+    """A file a stage read: its name within the run (or mesh folder) and its content."""
+
+    path: str
+    sha256: str
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """What made a file. Equal provenance means equal bytes.
+
+    key : digest over configuration, code and inputs; the freshness criterion.
+    """
+
+    stage: str
+    key: str
+    config_digest: str
+    code_digest: str
+    seed: int
+    inputs: tuple[Input, ...]
+    package_version: str
+    schema_version: str = SCHEMA_VERSION
+
+    def to_metadata(self) -> dict[str, str]:
+        """The record as MCAP metadata (strings only)."""
+        fields = asdict(self)
+        fields["inputs"] = json.dumps(fields["inputs"], sort_keys=True)
+        return {name: str(value) for name, value in fields.items()}
+
+    @classmethod
+    def from_metadata(cls, metadata: dict[str, str]) -> Self:
+        """Read the record back.
+
+        Raises
+        ------
+        ArtifactError : fields are missing, or another major schema version wrote it.
+        """
+        written = metadata.get("schema_version", "none")
+        if written != SCHEMA_VERSION:
+            raise ArtifactError(
+                f"Written with schema version {written}, this softgrip reads {SCHEMA_VERSION}",
+                "Use the softgrip version that wrote it, or make the file again",
+            )
+        try:
+            inputs = tuple(Input(**entry) for entry in json.loads(metadata["inputs"]))
+            return cls(
+                stage=metadata["stage"],
+                key=metadata["key"],
+                config_digest=metadata["config_digest"],
+                code_digest=metadata["code_digest"],
+                seed=int(metadata["seed"]),
+                inputs=inputs,
+                package_version=metadata["package_version"],
+            )
+        except (KeyError, TypeError, ValueError) as error:
+            raise ArtifactError(
+                f"The provenance record cannot be read ({error!r})",
+                "The file is damaged: make it again",
+            ) from error
+
+
+def package_version() -> str:
+    """The installed softgrip version; 'source' when run from a bare checkout."""
+    try:
+        return version("softgrip")
+    except PackageNotFoundError:
+        return "source"

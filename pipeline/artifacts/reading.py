@@ -1,0 +1,166 @@
+"""Reading an MCAP artifact: checked, versioned, and refused in words when damaged."""
+
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TypeVar
+
+import zstandard
+from google.protobuf.message import DecodeError, Message
+from mcap.exceptions import McapError
+from mcap.reader import McapReader, make_reader
+
+from pipeline.artifacts.provenance import METADATA_NAME, Provenance
+from pipeline.errors import ArtifactError
+
+M = TypeVar("M", bound=Message)
+
+# What a reader of damaged bytes can raise; anything else is a bug of ours.
+DAMAGE = (
+    McapError,
+    DecodeError,
+    zstandard.ZstdError,
+    struct.error,
+    UnicodeDecodeError,
+    EOFError,
+    ValueError,
+    KeyError,
+    AssertionError,
+    RuntimeError,
+    MemoryError,
+    OverflowError,
+    IndexError,
+)
+
+
+class Artifact:
+    """One open MCAP artifact."""
+
+    def __init__(self, path: Path, reader: McapReader) -> None:
+        self.path = path
+        self._reader = reader
+        self.provenance = self._read_provenance()
+
+    def messages(self, kind: type[M], topic: str | None = None) -> Iterator[tuple[int, M]]:
+        """(log_time_ns, message) of every message of a type, in log-time order.
+
+        Raises
+        ------
+        ArtifactError : a topic carries another version of the type, or bytes are damaged.
+        """
+        wanted = kind.DESCRIPTOR.full_name
+        topics = self._topics_of(wanted) if topic is None else [topic]
+        if not topics:
+            return
+        with _named(self.path):
+            for schema, channel, message in self._reader.iter_messages(topics=topics):
+                if schema is None or schema.name != wanted:
+                    carried = "no schema" if schema is None else schema.name
+                    raise ArtifactError(
+                        f"{self.path}: topic '{channel.topic}' carries {carried}, "
+                        f"this softgrip reads {wanted}",
+                        "Make the file again with this version",
+                    )
+                yield message.log_time, kind.FromString(message.data)
+
+    def one(self, kind: type[M]) -> M:
+        """The only message of a type."""
+        found = [message for _, message in self.messages(kind)]
+        if len(found) != 1:
+            raise ArtifactError(
+                f"{self.path} holds {len(found)} {kind.DESCRIPTOR.full_name}, expected one",
+                "Make the file again",
+            )
+        return found[0]
+
+    def attachment(self, name: str) -> bytes:
+        """The bytes attached under a name."""
+        with _named(self.path):
+            for attachment in self._reader.iter_attachments():
+                if attachment.name == name:
+                    return bytes(attachment.data)
+        raise ArtifactError(f"{self.path} has no attachment '{name}'", "Make the file again")
+
+    def counts(self) -> dict[str, tuple[str, int]]:
+        """Topic → (schema name, messages)."""
+        with _named(self.path):
+            summary = self._reader.get_summary()
+        if summary is None or summary.statistics is None:
+            return {}
+        return {
+            channel.topic: (
+                summary.schemas[channel.schema_id].name,
+                summary.statistics.channel_message_counts.get(channel.id, 0),
+            )
+            for channel in summary.channels.values()
+        }
+
+    def _topics_of(self, schema_name: str) -> list[str]:
+        base, _, short = schema_name.rpartition(".")
+        found = []
+        for topic, (carried, _) in self.counts().items():
+            carried_base, _, carried_short = carried.rpartition(".")
+            if carried == schema_name:
+                found.append(topic)
+            elif carried_short == short and carried_base.split(".")[0] == base.split(".")[0]:
+                raise ArtifactError(
+                    f"{self.path} was written with {carried}, this softgrip reads {schema_name}",
+                    "Use the softgrip version that wrote it, or make the file again",
+                )
+        return found
+
+    def _read_provenance(self) -> Provenance:
+        with _named(self.path):
+            for metadata in self._reader.iter_metadata():
+                if metadata.name == METADATA_NAME:
+                    return Provenance.from_metadata(metadata.metadata)
+        raise ArtifactError(
+            f"{self.path} carries no provenance", "It is not a softgrip artifact: make it again"
+        )
+
+
+@contextmanager
+def open_artifact(path: Path) -> Iterator[Artifact]:
+    """Open an artifact for reading, every checksum on.
+
+    Raises
+    ------
+    ArtifactError : missing, not an MCAP, damaged, or of another version.
+    """
+    try:
+        file = path.open("rb")
+    except FileNotFoundError as error:
+        raise ArtifactError(
+            f"{path} does not exist", "Run the stage that makes it (see 'make help')"
+        ) from error
+    except OSError as error:
+        raise ArtifactError(f"{path} cannot be read: {error.strerror}", "Mend its access") from error
+    with file:
+        with _named(path):
+            reader = make_reader(file, validate_crcs=True)
+        yield Artifact(path, reader)
+
+
+def read_provenance(path: Path) -> Provenance:
+    """The provenance record of a file."""
+    with open_artifact(path) as artifact:
+        return artifact.provenance
+
+
+@contextmanager
+def _named(path: Path) -> Iterator[Any]:
+    """Damage found while reading, as one sentence that names the file."""
+    try:
+        yield
+    except ArtifactError as error:
+        if str(path) in error.what:
+            raise
+        raise ArtifactError(f"{path}: {error.what}", error.remedy) from error
+    except DAMAGE as error:
+        raise ArtifactError(
+            f"{path} is damaged ({type(error).__name__}: {error})",
+            "Delete it and run the same command again",
+        ) from error
+
+

@@ -1,0 +1,99 @@
+"""Writing an MCAP artifact: protobuf messages, provenance first, published whole."""
+
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import BinaryIO, Literal, Self
+
+from google.protobuf.message import Message
+from mcap.well_known import MessageEncoding
+from mcap.writer import CompressionType, Writer
+from mcap_protobuf.schema import register_schema
+
+from pipeline.artifacts.provenance import METADATA_NAME, Provenance
+from pipeline.artifacts.publishing import published
+from pipeline.errors import ArtifactError
+
+Compression = Literal["zstd", "lz4", "none"]
+COMPRESSIONS = {
+    "zstd": CompressionType.ZSTD,
+    "lz4": CompressionType.LZ4,
+    "none": CompressionType.NONE,
+}
+
+
+class ArtifactWriter:
+    """Write one artifact; the file appears at ``path`` when the block ends well.
+
+    >>> with ArtifactWriter(path, provenance) as artifact:
+    ...     artifact.write("/objects", message, log_time_ns=0)
+    """
+
+    def __init__(
+        self, path: Path, provenance: Provenance, compression: Compression = "zstd"
+    ) -> None:
+        self._path = path
+        self._provenance = provenance
+        self._compression = COMPRESSIONS[compression]
+        self._channels: dict[str, tuple[int, str]] = {}
+        self._schemas: dict[str, int] = {}
+
+    def __enter__(self) -> Self:
+        self._stack = ExitStack()
+        scratch = self._stack.enter_context(published(self._path))
+        self._file: BinaryIO = self._stack.enter_context(scratch.open("wb"))
+        self._writer = Writer(
+            self._file, compression=self._compression, enable_data_crcs=True
+        )
+        self._writer.start(profile="", library="softgrip")
+        self._writer.add_metadata(METADATA_NAME, self._provenance.to_metadata())
+        return self
+
+    def write(self, topic: str, message: Message, log_time_ns: int) -> None:
+        """Append a message; ``log_time_ns`` is simulated time or the sample's index.
+
+        Raises
+        ------
+        ArtifactError : the topic already carries another message type.
+        """
+        name = message.DESCRIPTOR.full_name
+        channel, carried = self._channels.get(topic, (0, name))
+        if carried != name:
+            raise ArtifactError(
+                f"{self._path}: topic '{topic}' carries {carried} and cannot take a {name}",
+                "Write it on a topic of its own",
+            )
+        if topic not in self._channels:
+            if name not in self._schemas:
+                self._schemas[name] = register_schema(self._writer, type(message))
+            channel = self._writer.register_channel(
+                topic=topic,
+                message_encoding=MessageEncoding.Protobuf,
+                schema_id=self._schemas[name],
+            )
+            self._channels[topic] = (channel, name)
+        self._writer.add_message(
+            channel_id=channel,
+            log_time=log_time_ns,
+            publish_time=log_time_ns,
+            # Without it, map fields may come out in another order on another run.
+            data=message.SerializeToString(deterministic=True),
+        )
+
+    def attach(self, name: str, media_type: str, data: bytes) -> None:
+        """Add a named file, such as a checkpoint."""
+        self._writer.add_attachment(
+            create_time=0, log_time=0, name=name, media_type=media_type, data=data
+        )
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if error is not None:
+            self._stack.__exit__(kind, error, trace)
+            return
+        with self._stack:
+            self._writer.finish()

@@ -1,0 +1,83 @@
+"""[gripper], [grasps] and [sensing]: the pad, the labels, the sub point cloud."""
+
+import math
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from pipeline.config.section import Section
+
+SolverName = Literal["structured", "piqp-sparse", "piqp-dense", "clarabel"]
+
+
+class PadConfig(Section):
+    """The soft pad's geometry: Table I."""
+
+    seal_radius_m: float = Field(0.020, gt=0, description="r_v, radius of Reg.V; Table I [m]")
+    radius_m: float = Field(0.025, gt=0, description="r_G, radius of the pad; Table I [m]")
+    altitude_m: float = Field(0.030, gt=0, description="H, altitude of the pad; Table I [m]")
+    rotation_step_rad: float = Field(
+        0.045 * math.pi, gt=0, le=math.pi / 2, description="Delta_theta; Table I [rad]"
+    )
+    radius_step_m: float = Field(0.002, gt=0, description="Delta_r, upper bound; Table I [m]")
+    distance_step_m: float = Field(0.002, gt=0, description="Delta_d; Table I [m]")
+    contact_tolerance_m: float = Field(
+        1e-4, ge=0, description="a vertex this near the surface is in contact; reading.md [m]"
+    )
+
+    @model_validator(mode="after")
+    def _seal_inside_pad(self) -> Self:
+        if self.seal_radius_m > self.radius_m:
+            raise ValueError("seal_radius_m must not exceed radius_m")
+        return self
+
+
+class GripperConfig(Section):
+    """Contact physics and the quality QP: Eq. (2)-(14)."""
+
+    pad: PadConfig = PadConfig()
+    friction: float = Field(0.5, gt=0, le=2, description="mu of Eq. (3)-(11) [1]")
+    weight_spread: float = Field(0.1, ge=0, lt=1, description="sigma_W of Eq. (13) [1]")
+    quality_scale: float = Field(
+        math.log(100.0), gt=0, description="s of S-1.12; ln 100: a pad holding nothing has q=0.01"
+    )
+    max_iterations: int = Field(100, ge=1, le=100, description="QP iterations; Supplement III")
+    solver: SolverName = Field("structured", description="which solver of the quality QP labels")
+
+
+class GraspsConfig(Section):
+    """How many grasps, where they are tried, and how they are batched."""
+
+    count: int = Field(5000, ge=1, description="labelled grasps wanted in all")
+    oversampling: float = Field(
+        2.0, ge=1, le=20, description="candidates labelled per grasp kept, to flatten the labels"
+    )
+    balance: float = Field(
+        0.7, ge=0, le=1, description="0 keeps the proposal's labels, 1 draws a flat histogram"
+    )
+    uniform_share: float = Field(
+        0.5, ge=0, le=1, description="share of contacts drawn uniformly over the visible surface"
+    )
+    tilt_max_rad: float = Field(
+        0.6, ge=0, lt=math.pi / 2, description="largest tilt of the approach off the normal [rad]"
+    )
+    normal_radius_m: float = Field(
+        0.010, gt=0, description="surface normal is the mean over this radius [m]"
+    )
+    clearance_m: float = Field(
+        0.15, gt=0, description="height above the contact from which the pad descends [m]"
+    )
+    samples_per_message: int = Field(256, ge=1, le=8192)
+
+
+class SensingConfig(Section):
+    """From a rendered depth image to the sample's cloud: S-1.13 - S-1.15."""
+
+    noise: Literal["none", "time-of-flight", "lidar", "structured-light"] = Field(
+        "time-of-flight", description="depth noise model of the Disturb step"
+    )
+    grid_cells: int = Field(24, ge=8, le=128, description="cells a side; Supplement III: 24")
+    grid_side_m: float = Field(0.06, gt=0, description="side of the square around the pad [m]")
+    grid_depth_m: float = Field(
+        0.03, gt=0, description="points farther than this from the contact along z are clipped [m]"
+    )

@@ -1,0 +1,62 @@
+"""[objects] and [split]: from meshes to the object catalogue."""
+
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from pipeline.config.section import Section
+
+
+class ConvexPartsConfig(Section):
+    """Convex decomposition (CoACD) for collision shapes."""
+
+    concavity: float = Field(0.08, ge=0.01, le=1.0, description="CoACD concavity threshold [1]")
+    max_parts: int = Field(24, ge=1, le=256, description="most convex parts an object may have")
+    search_iterations: int = Field(60, ge=10, le=500, description="CoACD tree-search iterations")
+    resolution: int = Field(1000, ge=200, le=10000, description="CoACD sampling resolution")
+    input_faces: int = Field(
+        2000, ge=100, le=200_000, description="faces the mesh is decimated to before decomposition"
+    )
+
+
+class ObjectsConfig(Section):
+    """Mesh intake: units, repair bounds, rescaling, physical properties."""
+
+    limit: int = Field(0, ge=0, description="most objects taken, spread over classes; 0 = all")
+    unit: Literal["auto", "m", "cm", "mm", "in"] = Field(
+        "auto", description="length unit of mesh files that do not declare one; auto = by extent"
+    )
+    min_extent_m: float = Field(0.002, gt=0, description="smaller meshes are refused [m]")
+    max_extent_m: float = Field(5.0, gt=0, description="larger meshes are refused [m]")
+    max_file_mib: int = Field(512, ge=1, description="larger mesh files are refused unread [MiB]")
+    max_faces: int = Field(2_000_000, ge=4, description="meshes with more faces are refused")
+    max_hole_fraction: float = Field(
+        0.02, ge=0, le=1, description="largest area share of the surface that repair may invent [1]"
+    )
+    target_extent_min_m: float = Field(
+        0.06, gt=0, description="smallest longest-extent after rescaling [m]; Supplement III"
+    )
+    target_extent_max_m: float = Field(
+        0.16, gt=0, description="largest longest-extent after rescaling [m]; Supplement III"
+    )
+    density_kg_m3: float = Field(300.0, gt=0, description="mass from the closed mesh [kg/m3]")
+    convex: ConvexPartsConfig = ConvexPartsConfig()
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        if self.target_extent_min_m > self.target_extent_max_m:
+            raise ValueError("target_extent_min_m must not exceed target_extent_max_m")
+        return self
+
+
+class SplitConfig(Section):
+    """Split by object: no object is ever in two of train, val, test."""
+
+    val_fraction: float = Field(0.15, gt=0, lt=1, description="share of objects for validation")
+    test_fraction: float = Field(0.25, gt=0, lt=1, description="share of objects for test")
+
+    @model_validator(mode="after")
+    def _leaves_training_objects(self) -> Self:
+        if self.val_fraction + self.test_fraction >= 1:
+            raise ValueError("val_fraction + test_fraction must leave objects for training")
+        return self

@@ -1,0 +1,65 @@
+"""[scenes] and [camera]: clutter, settling, and what the cameras are."""
+
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from pipeline.config.section import Section
+
+
+class ClutterCounts(Section):
+    """Clutters built per level, by the split their objects come from."""
+
+    train: int = Field(3, ge=0)
+    val: int = Field(1, ge=0)
+    test: int = Field(1, ge=0, description="also the clutters of the closed-loop evaluation")
+
+
+class ScenesConfig(Section):
+    """Clutter scenes of Table II and how they come to rest."""
+
+    levels: tuple[int, ...] = Field(
+        (1, 2, 3, 4, 5, 6, 7, 8, 9), min_length=1, description="clutter levels; Table II"
+    )
+    clutters_per_level: ClutterCounts = ClutterCounts()
+    objects_per_clutter: int = Field(10, ge=1, le=50, description="Supplement V: 10")
+    isolated_gap_min_m: float = Field(0.05, gt=0, description="Supplement V: 5 cm [m]")
+    multiple_gap_max_m: float = Field(0.01, gt=0, description="Supplement V: 1 cm [m]")
+    placement_attempts: int = Field(60, ge=1, description="tries at one clutter before giving up")
+    table_side_m: float = Field(1.2, gt=0.2, le=5, description="side of the square table [m]")
+    friction: float = Field(0.5, ge=0, le=2, description="object-object and object-table; mu [1]")
+    timestep_s: float = Field(1 / 240, gt=0, le=0.02, description="physics step [s]")
+    settle_linear_m_s: float = Field(0.005, gt=0, description="at rest below this speed [m/s]")
+    settle_angular_rad_s: float = Field(0.1, gt=0, description="at rest below this rate [rad/s]")
+    settle_hold_s: float = Field(0.25, gt=0, description="time the bounds must hold [s]")
+    settle_max_s: float = Field(12.0, gt=0, description="simulated time before giving up [s]")
+
+    @model_validator(mode="after")
+    def _levels_exist(self) -> Self:
+        unknown = [level for level in self.levels if not 1 <= level <= 9]
+        if unknown:
+            raise ValueError(f"levels go from 1 to 9 (Table II), got {unknown}")
+        return self
+
+
+class CameraConfig(Section):
+    """A pinhole depth camera looking at the table; defaults: Kinect v2 depth camera."""
+
+    width_px: int = Field(512, ge=16, le=4096, description="Kinect v2 depth image: 512")
+    height_px: int = Field(424, ge=16, le=4096, description="Kinect v2 depth image: 424")
+    vertical_fov_rad: float = Field(1.0472, gt=0.05, lt=2.8, description="Kinect v2: 60 deg [rad]")
+    distance_m: float = Field(0.75, gt=0.05, description="from the clutter's centre [m]")
+    elevations_rad: tuple[float, ...] = Field(
+        (1.30,), min_length=1, description="angle above the table, one a viewpoint [rad]"
+    )
+    azimuths_rad: tuple[float, ...] = Field(
+        (0.0,), min_length=1, description="angle about world z, one a viewpoint [rad]"
+    )
+    near_m: float = Field(0.05, gt=0, description="nearest measurable depth [m]")
+    far_m: float = Field(4.5, gt=0, description="farthest measurable depth; Kinect v2: 4.5 [m]")
+
+    @model_validator(mode="after")
+    def _viewpoints_pair_up(self) -> Self:
+        if len(self.elevations_rad) != len(self.azimuths_rad):
+            raise ValueError("elevations_rad and azimuths_rad need the same length")
+        return self

@@ -1,0 +1,104 @@
+"""The configuration tree of a run, and how run.toml becomes one.
+
+Every number a run depends on is a field here; its digest by section decides
+which stages are stale, so nothing that leaves results unchanged (worker
+count, log level) belongs in it.
+"""
+
+import difflib
+import hashlib
+import json
+import operator
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from pydantic import Field, ValidationError
+
+from pipeline.config.evaluation import EvaluateConfig, RecordingConfig
+from pipeline.config.grasps import GraspsConfig, GripperConfig, SensingConfig
+from pipeline.config.learning import NetworkConfig, ShardsConfig, TrainConfig
+from pipeline.config.objects import ObjectsConfig, SplitConfig
+from pipeline.config.scenes import CameraConfig, ScenesConfig
+from pipeline.config.section import Section
+from pipeline.errors import ConfigError
+
+
+class RunConfig(Section):
+    """All of runs/<run>/run.toml."""
+
+    seed: int = Field(0, ge=0, lt=2**63, description="root of every random stream of the run")
+    objects: ObjectsConfig = ObjectsConfig()
+    split: SplitConfig = SplitConfig()
+    scenes: ScenesConfig = ScenesConfig()
+    camera: CameraConfig = CameraConfig()
+    gripper: GripperConfig = GripperConfig()
+    sensing: SensingConfig = SensingConfig()
+    grasps: GraspsConfig = GraspsConfig()
+    shards: ShardsConfig = ShardsConfig()
+    network: NetworkConfig = NetworkConfig()
+    train: TrainConfig = TrainConfig()
+    evaluate: EvaluateConfig = EvaluateConfig()
+    recording: RecordingConfig = RecordingConfig()
+
+
+def load_run_config(path: Path) -> RunConfig:
+    """Read and validate a run.toml.
+
+    Raises
+    ------
+    ConfigError : the file is absent, is not TOML, or holds a key or value that
+        the tree does not allow; the message names the key and the nearest one.
+    """
+    try:
+        raw = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as error:
+        known = sorted(p.parent.name for p in path.parent.parent.glob("*/run.toml"))
+        raise ConfigError(
+            f"{path} does not exist",
+            f"Create it, or choose one of the runs there are: {', '.join(known) or 'none'}",
+        ) from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path} is not valid TOML: {error}", "Mend that line") from error
+    try:
+        return RunConfig.model_validate(raw)
+    except ValidationError as error:
+        raise _explained(path, error) from error
+
+
+def section_digest(config: RunConfig, sections: tuple[str, ...]) -> str:
+    """SHA-256 over the named sections' values, independent of file layout.
+
+    sections : names such as ``"grasps"`` or, for one field of a section, ``"recording.grasps"``.
+    """
+    values = {name: _plain(operator.attrgetter(name)(config)) for name in sections}
+    return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
+
+
+def _plain(value: Any) -> Any:
+    return value.model_dump(mode="json") if isinstance(value, Section) else value
+
+
+def _explained(path: Path, error: ValidationError) -> ConfigError:
+    """The first problem of a validation, in words."""
+    problem = error.errors()[0]
+    location = [str(part) for part in problem["loc"]]
+    dotted = ".".join(location) or "the file"
+    if problem["type"] == "extra_forbidden":
+        known = _field_names(location[:-1])
+        near = difflib.get_close_matches(location[-1], known, n=1, cutoff=0.5)
+        remedy = f"Did you mean '{near[0]}'?" if near else f"Known keys: {', '.join(known)}"
+        return ConfigError(f"{path}: unknown key '{dotted}'", remedy)
+    return ConfigError(
+        f"{path}: '{dotted}' = {problem['input']!r}: {problem['msg']}", "Change the value"
+    )
+
+
+def _field_names(location: list[str]) -> list[str]:
+    model: type[Section] = RunConfig
+    for part in location:
+        annotation = model.model_fields[part].annotation
+        if not (isinstance(annotation, type) and issubclass(annotation, Section)):
+            return []
+        model = annotation
+    return list(model.model_fields)

@@ -1,0 +1,36 @@
+"""The one family of errors a person is meant to read."""
+
+
+class SoftgripError(Exception):
+    """A failure with a cause and a way out, both in one sentence.
+
+    Parameters
+    ----------
+    what : the subject and what is wrong with it, naming the file or field.
+    remedy : what the reader can do about it.
+    """
+
+    def __init__(self, what: str, remedy: str) -> None:
+        self.what = what
+        self.remedy = remedy
+        super().__init__(f"{what}. {remedy}")
+
+
+class ConfigError(SoftgripError):
+    """A run's configuration cannot be used as it stands."""
+
+
+class MeshError(SoftgripError):
+    """A mesh cannot be turned into an object of the catalogue."""
+
+
+class ArtifactError(SoftgripError):
+    """A file between two stages is missing, damaged or of another version."""
+
+
+class SceneError(SoftgripError):
+    """A clutter scene misses its level's definition."""
+
+
+class MachineError(SoftgripError):
+    """The machine lacks something that a stage needs."""

@@ -1,0 +1,19 @@
+"""Work items → results, in order: stages, seeds, progress, freshness, resume."""
+
+from pipeline.execution.executors import run_in_order
+from pipeline.execution.progress import progress
+from pipeline.execution.running import Summary, stage_command
+from pipeline.execution.seeds import derive_seed, generator
+from pipeline.execution.stage import RunFolder, Stage, StageContext
+
+__all__ = [
+    "RunFolder",
+    "Stage",
+    "StageContext",
+    "Summary",
+    "derive_seed",
+    "generator",
+    "progress",
+    "run_in_order",
+    "stage_command",
+]

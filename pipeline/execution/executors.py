@@ -1,0 +1,54 @@
+"""Work items in, results out, in order; whoever computes them.
+
+A work item is a picklable value, a job a module-level function of one item.
+Results arrive in the order of the items, so what is written never depends on
+the number of workers.
+"""
+
+import multiprocessing
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from typing import TypeVar
+
+from pipeline.errors import SoftgripError
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+AHEAD_PER_WORKER = 2  # items in flight, so that a slow consumer bounds memory
+
+
+def run_in_order(
+    job: Callable[[Item], Result], items: Iterable[Item], workers: int
+) -> Iterator[Result]:
+    """Yield ``job(item)`` for every item, in order, from ``workers`` processes.
+
+    One worker runs in this process. Processes are spawned, not forked: drivers
+    of graphics and threads of native libraries do not survive a fork.
+
+    Raises
+    ------
+    SoftgripError : a worker process died (killed, or out of memory).
+    """
+    if workers <= 1:
+        yield from map(job, items)
+        return
+    pool = ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
+    waiting: deque[Future[Result]] = deque()
+    try:
+        for item in items:
+            waiting.append(pool.submit(job, item))
+            if len(waiting) >= workers * AHEAD_PER_WORKER:
+                yield waiting.popleft().result()
+        while waiting:
+            yield waiting.popleft().result()
+    except BrokenProcessPool as error:
+        raise SoftgripError(
+            "A worker process died: it was killed or the machine ran out of memory",
+            "Run the same command again, it goes on where it stopped; "
+            "with less memory, set WORKERS=1",
+        ) from error
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)

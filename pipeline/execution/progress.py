@@ -1,0 +1,26 @@
+"""Progress of anything longer than a few seconds: rate and remaining time."""
+
+import sys
+from collections.abc import Iterable
+from typing import TypeVar
+
+from tqdm import tqdm
+
+T = TypeVar("T")
+
+QUIET_INTERVAL_S = 10.0  # a log file gets a line now and then, a screen gets a bar
+
+
+def progress(items: Iterable[T], total: int, what: str, unit: str) -> Iterable[T]:
+    """Pass items through while showing how far, how fast and how long still."""
+    on_screen = sys.stderr.isatty()
+    return tqdm(
+        items,
+        total=total,
+        desc=what,
+        unit=unit,
+        file=sys.stderr,
+        dynamic_ncols=on_screen,
+        mininterval=0.2 if on_screen else QUIET_INTERVAL_S,
+        smoothing=0.1,
+    )

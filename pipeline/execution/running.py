@@ -1,0 +1,193 @@
+"""Running one stage from the command line: lock, freshness, log, summary, plain failures."""
+
+import json
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FrameType
+from typing import Annotated, Any
+
+import typer
+from filelock import FileLock, Timeout
+from loguru import logger
+
+from pipeline.artifacts import open_artifact, publish_bytes, read_provenance
+from pipeline.config import load_run_config
+from pipeline.errors import ArtifactError, ConfigError, SoftgripError
+from pipeline.execution.freshness import Key, stage_key
+from pipeline.execution.stage import RunFolder, Stage, StageContext
+from schemas.softgrip.v1.grasps_pb2 import ShardIndex
+
+Summary = dict[str, Any]
+Build = Callable[[StageContext], Summary]
+InputsOf = Callable[[Stage, RunFolder, Path | None], dict[str, Path]]
+
+EXIT_FAILURE = 1
+EXIT_INTERRUPTED = 130
+
+
+def stage_command(stage: Stage, build: Build, inputs_of: InputsOf) -> None:
+    """The command line of a stage's module."""
+
+    def command(
+        run: Annotated[str, typer.Option(help="name of the run: runs/<run>/run.toml")] = "default",
+        runs_dir: Annotated[Path, typer.Option(help="folder of all runs")] = Path("runs"),
+        mesh_dir: Annotated[
+            Path | None,
+            typer.Option(
+                envvar="MESH_DIR", help="folder of meshes; without it the embedded set"
+            ),
+        ] = None,
+        workers: Annotated[
+            int, typer.Option(envvar="WORKERS", min=1, help="worker processes")
+        ] = len(os.sched_getaffinity(0)),
+        force: Annotated[bool, typer.Option(help="run even when nothing changed")] = False,
+    ) -> None:
+        folder = RunFolder(runs_dir / run)
+        with _readable_failures(stage, folder):
+            context = stage_context(stage, folder, inputs_of, mesh_dir, workers)
+            with _exclusive(folder, stage):
+                run_stage(context, build, force=force)
+
+    command.__doc__ = build.__doc__
+    app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+    app.command(name=stage.name)(command)
+    app()
+
+
+def stage_context(
+    stage: Stage, folder: RunFolder, inputs_of: InputsOf, mesh_dir: Path | None, workers: int
+) -> StageContext:
+    """Configuration, inputs and key of a stage as things are now.
+
+    Raises
+    ------
+    ConfigError : run.toml cannot be used.
+    ArtifactError : an upstream artifact is missing.
+    """
+    if "/" in folder.path.name or folder.path.name in ("", ".", ".."):
+        raise ConfigError(f"'{folder.path.name}' is no run name", "Use a plain name")
+    config = load_run_config(folder.config)
+    inputs = inputs_of(stage, folder, mesh_dir)
+    for name, path in inputs.items():
+        if not path.is_file():
+            raise ArtifactError(
+                f"{path} is missing, and {stage.name} reads it",
+                f"Make {name} first: 'make {stage.name} RUN={folder.path.name}' does both",
+            )
+    key = stage_key(config, stage.sections, stage.module, inputs, folder.state("hashes.json"))
+    return StageContext(stage, config, folder, key, inputs, workers)
+
+
+def is_fresh(context: StageContext) -> bool:
+    """Whether the stage's artifact is whole and was made from what is there now."""
+    output = context.output
+    if not output.is_file() or not context.recording.is_file():
+        return False
+    try:
+        if read_provenance(output).key != context.key.digest:
+            return False
+        return not context.stage.sharded or not missing_shards(output)
+    except ArtifactError as error:
+        logger.warning("{}", error)
+        return False
+
+
+def missing_shards(index: Path) -> list[Path]:
+    """Files that a sharded artifact's index names and that are not there."""
+    with open_artifact(index) as artifact:
+        entries = artifact.one(ShardIndex).shards
+    paths = [index.parent / entry.path for entry in entries]
+    return [path for path in paths if not path.is_file()]
+
+
+def run_stage(context: StageContext, build: Build, force: bool) -> None:
+    """Run a stage unless it is fresh; leave artifact, recording and summary."""
+    name, output = context.stage.name, context.output
+    if not force and is_fresh(context):
+        os.utime(output)  # Make compares dates: what is fresh by content is new by date
+        logger.info("{}: up to date, nothing to do", name)
+        return
+    started = time.perf_counter()
+    logger.info("{}: started ({} workers)", name, context.workers)
+    summary = build(context)
+    wall_s = time.perf_counter() - started
+    record = {"stage": name, "key": context.key.digest, "wall_time_s": round(wall_s, 3), **summary}
+    publish_bytes(
+        context.folder.summary(name), (json.dumps(record, indent=2) + "\n").encode()
+    )
+    publish_bytes(context.folder.state(f"{name}.built.json"), context.key.to_json().encode())
+    logger.info("{}: done in {:.1f} s, {}", name, wall_s, output)
+
+
+def built_key(folder: RunFolder, stage: str) -> Key | None:
+    """The key a stage was last built with, part by part."""
+    from pipeline.execution.freshness import key_from_json
+
+    try:
+        return key_from_json(folder.state(f"{stage}.built.json").read_text())
+    except FileNotFoundError:
+        return None
+
+
+@contextmanager
+def _exclusive(folder: RunFolder, stage: Stage) -> Iterator[None]:
+    """One process a run; the second is told who is at it."""
+    owner = folder.state("owner")
+    lock = FileLock(folder.state("lock"))
+    try:
+        lock.acquire(timeout=0)
+    except Timeout as error:
+        holder = owner.read_text().strip() if owner.is_file() else "another process"
+        raise SoftgripError(
+            f"{folder.path} is in use by {holder}",
+            "Wait until it is done, or stop it, then run the same command again",
+        ) from error
+    try:
+        owner.write_text(f"process {os.getpid()} (stage {stage.name})\n")
+        yield
+    finally:
+        owner.unlink(missing_ok=True)
+        lock.release()
+
+
+@contextmanager
+def _readable_failures(stage: Stage, folder: RunFolder) -> Iterator[None]:
+    """Every failure ends in one sentence and a non-zero exit; the trace goes to the log."""
+    logger.remove()
+    logger.add(sys.stderr, level="INFO", format="{message}")
+    signal.signal(signal.SIGTERM, _as_interrupt)
+    log = folder.log(stage.name)
+    try:
+        if folder.path.is_dir():
+            folder.state("").mkdir(parents=True, exist_ok=True)
+            logger.add(log, level="DEBUG", diagnose=False, rotation="10 MB", retention=3)
+        yield
+    except SoftgripError as error:
+        logger.error("{}: {}", stage.name, error)
+        _trace(error)
+        raise SystemExit(EXIT_FAILURE) from None
+    except KeyboardInterrupt as error:
+        logger.error(
+            "{}: interrupted. What is finished is kept: run the same command to go on", stage.name
+        )
+        _trace(error)
+        raise SystemExit(EXIT_INTERRUPTED) from None
+    except Exception as error:  # noqa: BLE001 - the last line of defence, told and logged
+        logger.error(
+            "{}: unexpected {}: {}. The trace is in {}", stage.name, type(error).__name__, error, log
+        )
+        _trace(error)
+        raise SystemExit(EXIT_FAILURE) from None
+
+
+def _trace(error: BaseException) -> None:
+    logger.opt(exception=error).debug("trace")
+
+
+def _as_interrupt(signum: int, frame: FrameType | None) -> None:
+    raise KeyboardInterrupt

@@ -1,0 +1,107 @@
+"""What a stage is, and what it is given when it runs."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipeline.artifacts import Input, Provenance, package_version
+from pipeline.config import RunConfig
+from pipeline.execution.freshness import Key
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One stage of the pipeline, as data.
+
+    sections : configuration sections its result depends on.
+    upstream : stages whose artifacts it reads.
+    sharded : its artifact is an index over files in a folder of the same name.
+    """
+
+    name: str
+    sections: tuple[str, ...]
+    upstream: tuple[str, ...] = ()
+    sharded: bool = False
+
+    @property
+    def module(self) -> str:
+        """The Python module that runs it."""
+        return f"stages.{self.name}"
+
+
+@dataclass(frozen=True)
+class RunFolder:
+    """Where everything of one run lies."""
+
+    path: Path
+
+    def artifact(self, stage: str) -> Path:
+        """The MCAP a stage hands over (for a sharded stage: its index)."""
+        return self.path / f"{stage}.mcap"
+
+    def shards(self, stage: str) -> Path:
+        """The folder of a sharded stage's files."""
+        return self.path / stage
+
+    def recording(self, stage: str) -> Path:
+        """The Rerun recording of a stage."""
+        return self.path / f"{stage}.rrd"
+
+    def summary(self, stage: str) -> Path:
+        """The headline figures of a stage."""
+        return self.path / f"{stage}.summary.json"
+
+    def log(self, stage: str) -> Path:
+        """The log of a stage's last runs, traces included."""
+        return self.path / "logs" / f"{stage}.log"
+
+    def state(self, name: str) -> Path:
+        """Bookkeeping that is not a result: keys, hashes, resume points."""
+        return self.path / ".state" / name
+
+    @property
+    def config(self) -> Path:
+        """The run's configuration."""
+        return self.path / "run.toml"
+
+
+@dataclass(frozen=True)
+class StageContext:
+    """What a running stage is given."""
+
+    stage: Stage
+    config: RunConfig
+    folder: RunFolder
+    key: Key
+    inputs: dict[str, Path]
+    workers: int
+
+    @property
+    def output(self) -> Path:
+        """The artifact this stage makes."""
+        return self.folder.artifact(self.stage.name)
+
+    @property
+    def recording(self) -> Path:
+        """The recording this stage makes."""
+        return self.folder.recording(self.stage.name)
+
+    @property
+    def shards(self) -> Path:
+        """The folder of this stage's shards."""
+        return self.folder.shards(self.stage.name)
+
+    def upstream(self, stage: str) -> Path:
+        """The artifact of a stage this one reads."""
+        return self.inputs[f"{stage}.mcap"]
+
+    def provenance(self) -> Provenance:
+        """The record every file of this stage carries."""
+        return Provenance(
+            stage=self.stage.name,
+            key=self.key.digest,
+            config_digest=self.key.config_digest,
+            code_digest=self.key.code_digest,
+            seed=self.config.seed,
+            inputs=tuple(Input(name, digest) for name, digest in self.key.inputs.items()),
+            package_version=package_version(),
+        )

@@ -1,0 +1,1 @@
+"""What this machine offers and lacks. Standard library only: it runs before anything is installed."""

@@ -1,0 +1,138 @@
+"""``make doctor``: what is present, what is missing, how to mend it, in plain words."""
+
+import importlib.metadata
+import os
+import platform
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipeline.machine import vulkan_driver
+
+ROOT = Path(__file__).resolve().parents[2]
+OLDEST_PYTHON = (3, 11)
+FREE_GIB_WANTED = 5
+RENDER_TRIAL = """
+from pipeline.simulation.engine import can_render
+raise SystemExit(0 if can_render() else 1)
+"""
+TRIAL_TIMEOUT_S = 120
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One line of the report; ``remedy`` is empty when all is well."""
+
+    subject: str
+    state: str
+    remedy: str = ""
+
+
+def check_python() -> Finding:
+    """The interpreter's version."""
+    state = f"{platform.python_version()} at {sys.executable}"
+    if sys.version_info[:2] < OLDEST_PYTHON:
+        return Finding("Python", state, "install Python 3.11 or newer: apt-get install python3")
+    return Finding("Python", state)
+
+
+def check_tools() -> Finding:
+    """Make, and the compiler that some wheels may need."""
+    missing = [tool for tool in ("make", "cc") if shutil.which(tool) is None]
+    if missing:
+        return Finding("tools", f"missing: {', '.join(missing)}", "apt-get install build-essential")
+    return Finding("tools", "make and a C compiler are there")
+
+
+def check_venv() -> Finding:
+    """The virtual environment and its pins."""
+    if not (ROOT / ".venv/.ready").is_file():
+        return Finding("packages", "the virtual environment is not set up", "run 'make setup'")
+    wrong = [
+        f"{name} {wanted} (there is {have})"
+        for name, wanted in _pins()
+        if (have := _installed(name)) != wanted
+    ]
+    if wrong:
+        return Finding("packages", f"not as pinned: {', '.join(wrong[:5])}", "run 'make setup'")
+    return Finding("packages", f"{len(_pins())} packages as pinned in constraints.txt")
+
+
+def check_driver() -> Finding:
+    """The Vulkan driver SAPIEN renders with."""
+    if vulkan_driver.has_gpu():
+        return Finding("Vulkan driver", "an NVIDIA GPU")
+    version = vulkan_driver.mesa_version()
+    named = "unknown version" if version is None else f"Mesa {version[0]}.{version[1]}"
+    if vulkan_driver.is_ready():
+        return Finding("Vulkan driver", f"software (lavapipe), {named}")
+    have = "none" if vulkan_driver.software_icd() is None else f"{named}, too old (24.3 needed)"
+    return Finding(
+        "Vulkan driver",
+        f"{have}: scenes would be rendered with Embree rays",
+        f"run\n{vulkan_driver.advice()}",
+    )
+
+
+def check_rendering() -> Finding:
+    """Whether SAPIEN really renders, tried in a process of its own."""
+    try:
+        trial = subprocess.run(
+            [sys.executable, "-c", RENDER_TRIAL],
+            cwd=ROOT, capture_output=True, text=True, check=False, timeout=TRIAL_TIMEOUT_S,
+        )
+    except subprocess.TimeoutExpired:
+        return Finding("SAPIEN", f"no frame within {TRIAL_TIMEOUT_S} s", "see the Vulkan driver")
+    if trial.returncode == 0:
+        return Finding("SAPIEN", "renders")
+    last = (trial.stderr.strip().splitlines() or ["no message"])[-1]
+    return Finding("SAPIEN", f"does not render: {last}", "see the Vulkan driver above")
+
+
+def check_room() -> Finding:
+    """Cores, and disk for a run."""
+    free_gib = shutil.disk_usage(ROOT).free / 2**30
+    state = f"{len(os.sched_getaffinity(0))} cores, {free_gib:.0f} GiB of disk free"
+    short = free_gib < FREE_GIB_WANTED
+    return Finding("room", state, f"free {FREE_GIB_WANTED} GiB of disk" if short else "")
+
+
+CHECKS: tuple[Callable[[], Finding], ...] = (
+    check_python,
+    check_tools,
+    check_venv,
+    check_driver,
+    check_rendering,
+    check_room,
+)
+
+
+def main() -> int:
+    """Print every finding; non-zero if something is to be mended."""
+    findings = [check() for check in CHECKS]
+    for finding in findings:
+        mark = "needs care" if finding.remedy else "well"
+        sys.stdout.write(f"{mark:<11} {finding.subject}: {finding.state}\n")
+        if finding.remedy:
+            sys.stdout.write(f"{'':<11} to mend it: {finding.remedy}\n")
+    return 1 if any(finding.remedy for finding in findings) else 0
+
+
+def _pins() -> list[tuple[str, str]]:
+    lines = (ROOT / "constraints.txt").read_text().splitlines()
+    pairs = (line.partition("==") for line in lines if "==" in line and not line.startswith("#"))
+    return [(name.strip(), version.strip()) for name, _, version in pairs]
+
+
+def _installed(name: str) -> str:
+    try:
+        return importlib.metadata.version(name).partition("+")[0]
+    except importlib.metadata.PackageNotFoundError:
+        return "none"
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,81 @@
+from schemas.softgrip.v1 import tensor_pb2 as _tensor_pb2
+from google.protobuf.internal import containers as _containers
+from google.protobuf import descriptor as _descriptor
+from google.protobuf import message as _message
+from collections.abc import Iterable as _Iterable, Mapping as _Mapping
+from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
+
+DESCRIPTOR: _descriptor.FileDescriptor
+
+class Attempt(_message.Message):
+    __slots__ = ("scene_id", "level", "attempt", "outcome", "cause", "target", "candidates", "predicted_quality", "reached_quality", "seal_pressure", "lifted_height_m", "duration_s", "world_from_gripper", "reached_pose", "time_s", "gripper_path", "object_paths", "base_wrench", "states")
+    SCENE_ID_FIELD_NUMBER: _ClassVar[int]
+    LEVEL_FIELD_NUMBER: _ClassVar[int]
+    ATTEMPT_FIELD_NUMBER: _ClassVar[int]
+    OUTCOME_FIELD_NUMBER: _ClassVar[int]
+    CAUSE_FIELD_NUMBER: _ClassVar[int]
+    TARGET_FIELD_NUMBER: _ClassVar[int]
+    CANDIDATES_FIELD_NUMBER: _ClassVar[int]
+    PREDICTED_QUALITY_FIELD_NUMBER: _ClassVar[int]
+    REACHED_QUALITY_FIELD_NUMBER: _ClassVar[int]
+    SEAL_PRESSURE_FIELD_NUMBER: _ClassVar[int]
+    LIFTED_HEIGHT_M_FIELD_NUMBER: _ClassVar[int]
+    DURATION_S_FIELD_NUMBER: _ClassVar[int]
+    WORLD_FROM_GRIPPER_FIELD_NUMBER: _ClassVar[int]
+    REACHED_POSE_FIELD_NUMBER: _ClassVar[int]
+    TIME_S_FIELD_NUMBER: _ClassVar[int]
+    GRIPPER_PATH_FIELD_NUMBER: _ClassVar[int]
+    OBJECT_PATHS_FIELD_NUMBER: _ClassVar[int]
+    BASE_WRENCH_FIELD_NUMBER: _ClassVar[int]
+    STATES_FIELD_NUMBER: _ClassVar[int]
+    scene_id: str
+    level: int
+    attempt: int
+    outcome: str
+    cause: str
+    target: str
+    candidates: int
+    predicted_quality: float
+    reached_quality: float
+    seal_pressure: float
+    lifted_height_m: float
+    duration_s: float
+    world_from_gripper: _tensor_pb2.Tensor
+    reached_pose: _tensor_pb2.Tensor
+    time_s: _tensor_pb2.Tensor
+    gripper_path: _tensor_pb2.Tensor
+    object_paths: _tensor_pb2.Tensor
+    base_wrench: _tensor_pb2.Tensor
+    states: _containers.RepeatedScalarFieldContainer[str]
+    def __init__(self, scene_id: _Optional[str] = ..., level: _Optional[int] = ..., attempt: _Optional[int] = ..., outcome: _Optional[str] = ..., cause: _Optional[str] = ..., target: _Optional[str] = ..., candidates: _Optional[int] = ..., predicted_quality: _Optional[float] = ..., reached_quality: _Optional[float] = ..., seal_pressure: _Optional[float] = ..., lifted_height_m: _Optional[float] = ..., duration_s: _Optional[float] = ..., world_from_gripper: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., reached_pose: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., time_s: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., gripper_path: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., object_paths: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., base_wrench: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., states: _Optional[_Iterable[str]] = ...) -> None: ...
+
+class LevelResult(_message.Message):
+    __slots__ = ("level", "attempts", "lifted", "objects", "clutters", "cleared", "success_rate", "interval_low", "interval_high", "failures")
+    class FailuresEntry(_message.Message):
+        __slots__ = ("key", "value")
+        KEY_FIELD_NUMBER: _ClassVar[int]
+        VALUE_FIELD_NUMBER: _ClassVar[int]
+        key: str
+        value: int
+        def __init__(self, key: _Optional[str] = ..., value: _Optional[int] = ...) -> None: ...
+    LEVEL_FIELD_NUMBER: _ClassVar[int]
+    ATTEMPTS_FIELD_NUMBER: _ClassVar[int]
+    LIFTED_FIELD_NUMBER: _ClassVar[int]
+    OBJECTS_FIELD_NUMBER: _ClassVar[int]
+    CLUTTERS_FIELD_NUMBER: _ClassVar[int]
+    CLEARED_FIELD_NUMBER: _ClassVar[int]
+    SUCCESS_RATE_FIELD_NUMBER: _ClassVar[int]
+    INTERVAL_LOW_FIELD_NUMBER: _ClassVar[int]
+    INTERVAL_HIGH_FIELD_NUMBER: _ClassVar[int]
+    FAILURES_FIELD_NUMBER: _ClassVar[int]
+    level: int
+    attempts: int
+    lifted: int
+    objects: int
+    clutters: int
+    cleared: int
+    success_rate: float
+    interval_low: float
+    interval_high: float
+    failures: _containers.ScalarMap[str, int]
+    def __init__(self, level: _Optional[int] = ..., attempts: _Optional[int] = ..., lifted: _Optional[int] = ..., objects: _Optional[int] = ..., clutters: _Optional[int] = ..., cleared: _Optional[int] = ..., success_rate: _Optional[float] = ..., interval_low: _Optional[float] = ..., interval_high: _Optional[float] = ..., failures: _Optional[_Mapping[str, int]] = ...) -> None: ...

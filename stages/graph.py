@@ -1,0 +1,124 @@
+"""The six stages as data, and what Make asks about them.
+
+``python -m stages.graph key STAGE`` rewrites a stage's key file only when its
+digest changed; ``status`` says what is stale and why.
+"""
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from loguru import logger
+
+from pipeline.artifacts import publish_bytes
+from pipeline.errors import SoftgripError
+from pipeline.execution.freshness import key_from_json
+from pipeline.execution.running import built_key, is_fresh, stage_context
+from pipeline.execution.stage import RunFolder, Stage
+from pipeline.geometry.mesh_files import list_mesh_files
+
+OBJECTS = Stage("objects", ("seed", "objects", "split", "recording.objects"))
+SCENES = Stage("scenes", ("seed", "scenes", "camera", "recording.scenes"), ("objects",))
+GRASPS = Stage(
+    "grasps",
+    ("seed", "gripper", "sensing", "grasps", "recording.grasps"),
+    ("objects", "scenes"),
+    sharded=True,
+)
+SHARDS = Stage("shards", ("seed", "shards", "recording.clouds"), ("grasps",), sharded=True)
+TRAIN = Stage("train", ("seed", "network", "train", "recording.clouds"), ("shards",))
+EVALUATE = Stage(
+    "evaluate",
+    ("seed", "evaluate", "scenes", "camera", "gripper", "sensing", "recording.attempts"),
+    ("objects", "scenes", "train"),
+)
+STAGES = {stage.name: stage for stage in (OBJECTS, SCENES, GRASPS, SHARDS, TRAIN, EVALUATE)}
+
+RUNS_DIR = Path("runs")
+
+
+def inputs_of(stage: Stage, folder: RunFolder, mesh_dir: Path | None) -> dict[str, Path]:
+    """Name → file of everything a stage reads."""
+    inputs = {f"{name}.mcap": folder.artifact(name) for name in stage.upstream}
+    if stage is OBJECTS and mesh_dir is not None:
+        inputs |= {f"meshes/{path.name}": path for path in list_mesh_files(mesh_dir)}
+    return inputs
+
+
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+RunName = Annotated[str, typer.Option(envvar="RUN")]
+MeshDir = Annotated[Path | None, typer.Option(envvar="MESH_DIR")]
+
+
+@app.command()
+def key(stage: str, run: RunName = "default", mesh_dir: MeshDir = None) -> None:
+    """Rewrite a stage's key file if what it depends on changed."""
+    folder = RunFolder(RUNS_DIR / run)
+    context = stage_context(STAGES[stage], folder, inputs_of, mesh_dir, workers=1)
+    path = folder.state(f"{stage}.key")
+    text = context.key.to_json()
+    if path.is_file() and path.read_text() == text and not _lost(folder, stage):
+        return
+    if path.is_file():
+        for change in context.key.differences(key_from_json(path.read_text())):
+            logger.info("{}: {}", stage, change)
+    publish_bytes(path, text.encode())
+
+
+@app.command()
+def status(run: RunName = "default", mesh_dir: MeshDir = None) -> None:
+    """Say of every stage whether it is fresh, and if not, why."""
+    folder = RunFolder(RUNS_DIR / run)
+    stale: set[str] = set()
+    for name, stage in STAGES.items():
+        reason = _staleness(stage, folder, mesh_dir, stale)
+        if reason:
+            stale.add(name)
+        sys.stdout.write(f"{name:<9} {'stale: ' + reason if reason else 'up to date'}\n")
+
+
+@app.command()
+def fresh(stage: str, run: RunName = "default") -> None:
+    """The closing line of a Make goal."""
+    sys.stdout.write(f"{RunFolder(RUNS_DIR / run).artifact(stage)} is up to date\n")
+
+
+def _staleness(stage: Stage, folder: RunFolder, mesh_dir: Path | None, stale: set[str]) -> str:
+    waits_for = [name for name in stage.upstream if name in stale]
+    if waits_for:
+        return f"after {', '.join(waits_for)}"
+    context = stage_context(stage, folder, inputs_of, mesh_dir, workers=1)
+    if is_fresh(context):
+        return ""
+    built = built_key(folder, stage.name)
+    if built is None:
+        return "never made"
+    return "; ".join(context.key.differences(built)) or "artifact, shard or recording missing"
+
+
+def _lost(folder: RunFolder, stage: str) -> bool:
+    """Whether a shard of a finished stage has gone: Make sees the index alone."""
+    from pipeline.execution.running import missing_shards
+
+    index = folder.artifact(stage)
+    return STAGES[stage].sharded and index.is_file() and bool(missing_shards(index))
+
+
+def main() -> None:
+    """Command line; failures end in one sentence."""
+    logger.remove()
+    logger.add(sys.stderr, level="INFO", format="{message}")
+    try:
+        app()
+    except SoftgripError as error:
+        logger.error("{}", error)
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    os.environ.setdefault("MESH_DIR", "")
+    if not os.environ["MESH_DIR"]:
+        del os.environ["MESH_DIR"]
+    main()
