@@ -15,6 +15,10 @@ class SoftgripError(Exception):
         self.remedy = remedy
         super().__init__(f"{what}. {remedy}")
 
+    def __reduce__(self) -> tuple[type["SoftgripError"], tuple[str, str]]:
+        """Cross process borders: exceptions pickle their message, not their parts."""
+        return type(self), (self.what, self.remedy)
+
 
 class ConfigError(SoftgripError):
     """A run's configuration cannot be used as it stands."""

@@ -19,11 +19,20 @@ def generate(into: Path) -> list[Path]:
     sources = sorted(str(p.relative_to(ROOT)) for p in ROOT.glob("schemas/softgrip/v*/*.proto"))
     well_known = str(files("grpc_tools") / "_proto")
     code = protoc.main(
-        ["protoc", f"-I{ROOT}", f"-I{well_known}", f"--python_out={into}", f"--pyi_out={into}", *sources]
+        [
+            "protoc",
+            f"-I{ROOT}",
+            f"-I{well_known}",
+            f"--python_out={into}",
+            f"--pyi_out={into}",
+            *sources,
+        ]
     )
     if code != 0:
         raise SystemExit(code)
-    return sorted([*into.glob("schemas/softgrip/v*/*_pb2.py"), *into.glob("schemas/softgrip/v*/*_pb2.pyi")])
+    return sorted(
+        [*into.glob("schemas/softgrip/v*/*_pb2.py"), *into.glob("schemas/softgrip/v*/*_pb2.pyi")]
+    )
 
 
 def main() -> int:

@@ -15,7 +15,7 @@ from loguru import logger
 from pipeline.artifacts import publish_bytes
 from pipeline.errors import SoftgripError
 from pipeline.execution.freshness import key_from_json
-from pipeline.execution.running import built_key, is_fresh, stage_context
+from pipeline.execution.running import built_key, is_fresh, missing_shards, stage_context
 from pipeline.execution.stage import RunFolder, Stage
 from pipeline.geometry.mesh_files import list_mesh_files
 
@@ -100,8 +100,6 @@ def _staleness(stage: Stage, folder: RunFolder, mesh_dir: Path | None, stale: se
 
 def _lost(folder: RunFolder, stage: str) -> bool:
     """Whether a shard of a finished stage has gone: Make sees the index alone."""
-    from pipeline.execution.running import missing_shards
-
     index = folder.artifact(stage)
     return STAGES[stage].sharded and index.is_file() and bool(missing_shards(index))
 

@@ -135,7 +135,9 @@ def open_artifact(path: Path) -> Iterator[Artifact]:
             f"{path} does not exist", "Run the stage that makes it (see 'make help')"
         ) from error
     except OSError as error:
-        raise ArtifactError(f"{path} cannot be read: {error.strerror}", "Mend its access") from error
+        raise ArtifactError(
+            f"{path} cannot be read: {error.strerror}", "Mend its access"
+        ) from error
     with file:
         with _named(path):
             reader = make_reader(file, validate_crcs=True)
@@ -162,5 +164,3 @@ def _named(path: Path) -> Iterator[Any]:
             f"{path} is damaged ({type(error).__name__}: {error})",
             "Delete it and run the same command again",
         ) from error
-
-

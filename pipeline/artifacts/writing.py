@@ -42,9 +42,7 @@ class ArtifactWriter:
         self._stack = ExitStack()
         scratch = self._stack.enter_context(published(self._path))
         self._file: BinaryIO = self._stack.enter_context(scratch.open("wb"))
-        self._writer = Writer(
-            self._file, compression=self._compression, enable_data_crcs=True
-        )
+        self._writer = Writer(self._file, compression=self._compression, enable_data_crcs=True)
         self._writer.start(profile="", library="softgrip")
         self._writer.add_metadata(METADATA_NAME, self._provenance.to_metadata())
         return self

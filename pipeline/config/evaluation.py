@@ -39,7 +39,9 @@ class PolicyConfig(Section):
         0.015, ge=0, description="how far a correction may move the contact [m]"
     )
     speed_m_s: float = Field(0.25, gt=0, le=2, description="approach speed [m/s]")
-    force_limit_n: float = Field(15.0, gt=0, description="contact force that stops the approach [N]")
+    force_limit_n: float = Field(
+        15.0, gt=0, description="contact force that stops the approach [N]"
+    )
 
 
 class EvaluateConfig(Section):

@@ -50,13 +50,22 @@ class GraspsConfig(Section):
 
     count: int = Field(5000, ge=1, description="labelled grasps wanted in all")
     oversampling: float = Field(
-        2.0, ge=1, le=20, description="candidates labelled per grasp kept, to flatten the labels"
+        3.0, ge=1, le=20, description="candidates labelled per grasp kept, to flatten the labels"
     )
     balance: float = Field(
         0.7, ge=0, le=1, description="0 keeps the proposal's labels, 1 draws a flat histogram"
     )
-    uniform_share: float = Field(
-        0.5, ge=0, le=1, description="share of contacts drawn uniformly over the visible surface"
+    normal_share: float = Field(
+        0.6, ge=0, le=1, description="share of first proposals along the mean surface normal [1]"
+    )
+    nearby_share: float = Field(
+        0.6, ge=0, lt=1, description="share of candidates proposed near rare labels [1]"
+    )
+    nearby_radius_m: float = Field(
+        0.004, gt=0, description="step of the contact to a nearby proposal [m]"
+    )
+    nearby_tilt_rad: float = Field(
+        0.08, ge=0, description="step of the approach to a nearby proposal [rad]"
     )
     tilt_max_rad: float = Field(
         0.6, ge=0, lt=math.pi / 2, description="largest tilt of the approach off the normal [rad]"

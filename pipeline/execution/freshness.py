@@ -8,7 +8,6 @@ content. A stage is fresh when its artifact carries the key of today.
 import ast
 import hashlib
 import json
-import os
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -108,11 +107,13 @@ def content_digests(files: dict[str, Path], memo: Path) -> dict[str, str]:
         known = {}
     digests, fresh = {}, {}
     for name, path in sorted(files.items()):
-        status = os.stat(path)
+        status = path.stat()
         mark = [status.st_size, status.st_mtime_ns, status.st_ino]
         remembered = known.get(str(path.resolve()))
-        same = remembered is not None and remembered["mark"] == mark
-        digests[name] = remembered["sha256"] if same else file_sha256(path)
+        if remembered is not None and remembered["mark"] == mark:
+            digests[name] = remembered["sha256"]
+        else:
+            digests[name] = file_sha256(path)
         fresh[str(path.resolve())] = {"mark": mark, "sha256": digests[name]}
     if any(known.get(path) != entry for path, entry in fresh.items()):
         publish_bytes(memo, json.dumps({**known, **fresh}, indent=1, sort_keys=True).encode())

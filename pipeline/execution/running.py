@@ -18,7 +18,7 @@ from loguru import logger
 from pipeline.artifacts import open_artifact, publish_bytes, read_provenance
 from pipeline.config import load_run_config
 from pipeline.errors import ArtifactError, ConfigError, SoftgripError
-from pipeline.execution.freshness import Key, stage_key
+from pipeline.execution.freshness import Key, key_from_json, stage_key
 from pipeline.execution.stage import RunFolder, Stage, StageContext
 from schemas.softgrip.v1.grasps_pb2 import ShardIndex
 
@@ -38,9 +38,7 @@ def stage_command(stage: Stage, build: Build, inputs_of: InputsOf) -> None:
         runs_dir: Annotated[Path, typer.Option(help="folder of all runs")] = Path("runs"),
         mesh_dir: Annotated[
             Path | None,
-            typer.Option(
-                envvar="MESH_DIR", help="folder of meshes; without it the embedded set"
-            ),
+            typer.Option(envvar="MESH_DIR", help="folder of meshes; without it the embedded set"),
         ] = None,
         workers: Annotated[
             int, typer.Option(envvar="WORKERS", min=1, help="worker processes")
@@ -117,17 +115,13 @@ def run_stage(context: StageContext, build: Build, force: bool) -> None:
     summary = build(context)
     wall_s = time.perf_counter() - started
     record = {"stage": name, "key": context.key.digest, "wall_time_s": round(wall_s, 3), **summary}
-    publish_bytes(
-        context.folder.summary(name), (json.dumps(record, indent=2) + "\n").encode()
-    )
+    publish_bytes(context.folder.summary(name), (json.dumps(record, indent=2) + "\n").encode())
     publish_bytes(context.folder.state(f"{name}.built.json"), context.key.to_json().encode())
     logger.info("{}: done in {:.1f} s, {}", name, wall_s, output)
 
 
 def built_key(folder: RunFolder, stage: str) -> Key | None:
     """The key a stage was last built with, part by part."""
-    from pipeline.execution.freshness import key_from_json
-
     try:
         return key_from_json(folder.state(f"{stage}.built.json").read_text())
     except FileNotFoundError:
@@ -179,7 +173,11 @@ def _readable_failures(stage: Stage, folder: RunFolder) -> Iterator[None]:
         raise SystemExit(EXIT_INTERRUPTED) from None
     except Exception as error:  # noqa: BLE001 - the last line of defence, told and logged
         logger.error(
-            "{}: unexpected {}: {}. The trace is in {}", stage.name, type(error).__name__, error, log
+            "{}: unexpected {}: {}. The trace is in {}",
+            stage.name,
+            type(error).__name__,
+            error,
+            log,
         )
         _trace(error)
         raise SystemExit(EXIT_FAILURE) from None

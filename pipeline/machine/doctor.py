@@ -82,7 +82,11 @@ def check_rendering() -> Finding:
     try:
         trial = subprocess.run(
             [sys.executable, "-c", RENDER_TRIAL],
-            cwd=ROOT, capture_output=True, text=True, check=False, timeout=TRIAL_TIMEOUT_S,
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=TRIAL_TIMEOUT_S,
         )
     except subprocess.TimeoutExpired:
         return Finding("SAPIEN", f"no frame within {TRIAL_TIMEOUT_S} s", "see the Vulkan driver")

@@ -39,7 +39,9 @@ def mesa_version() -> tuple[int, ...] | None:
         return None
     query = subprocess.run(
         ["dpkg-query", "-W", "-f", "${Version}", PACKAGE],
-        capture_output=True, text=True, check=False,
+        capture_output=True,
+        text=True,
+        check=False,
     )
     return _parsed(query.stdout) if query.returncode == 0 else None
 
@@ -75,10 +77,13 @@ def backports_source() -> str | None:
         for paragraph in re.split(r"\n\s*\n", text):
             if re.search(rf"^Suites:.*\b{suite}\b(?!-security)", paragraph, re.MULTILINE):
                 lines = [line for line in paragraph.splitlines() if not line.startswith("#")]
-                return "\n".join(
-                    f"Suites: {suite}-backports" if line.startswith("Suites:") else line
-                    for line in lines
-                ) + "\n"
+                return (
+                    "\n".join(
+                        f"Suites: {suite}-backports" if line.startswith("Suites:") else line
+                        for line in lines
+                    )
+                    + "\n"
+                )
     return None
 
 
@@ -93,8 +98,12 @@ def install() -> bool:
     environment = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
     for command in install_commands():
         done = subprocess.run(
-            command, env=environment, check=False, timeout=APT_TIMEOUT_S,
-            stdout=subprocess.DEVNULL, stdin=subprocess.DEVNULL,
+            command,
+            env=environment,
+            check=False,
+            timeout=APT_TIMEOUT_S,
+            stdout=subprocess.DEVNULL,
+            stdin=subprocess.DEVNULL,
         )
         if done.returncode != 0:
             return False

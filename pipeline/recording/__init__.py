@@ -1,0 +1,1 @@
+"""Rerun: what each stage shows, and its blueprint."""

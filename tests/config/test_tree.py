@@ -1,0 +1,79 @@
+"""run.toml becomes a tree, or one sentence that names the key."""
+
+from pathlib import Path
+
+import pytest
+from pydantic import ValidationError
+
+from pipeline.config import GripperConfig, RunConfig, load_run_config, section_digest
+from pipeline.errors import ConfigError
+
+RUNS = Path(__file__).resolve().parents[2] / "runs"
+
+
+def load(tmp_path: Path, text: str) -> RunConfig:
+    path = tmp_path / "run.toml"
+    path.write_text(text)
+    return load_run_config(path)
+
+
+def test_an_empty_file_is_the_default_tree(tmp_path: Path) -> None:
+    assert load(tmp_path, "") == RunConfig()
+
+
+@pytest.mark.parametrize("path", sorted(RUNS.glob("*/run.toml")), ids=lambda p: p.parent.name)
+def test_committed_runs_are_valid(path: Path) -> None:
+    assert load_run_config(path).grasps.count > 0
+
+
+def test_table_one_is_the_default_pad() -> None:
+    """Table I of the supplement, in metres and radians."""
+    pad = GripperConfig().pad
+    assert (pad.seal_radius_m, pad.radius_m, pad.altitude_m) == (0.020, 0.025, 0.030)
+    assert pad.rotation_step_rad == pytest.approx(0.141372, abs=1e-6)
+    assert (pad.radius_step_m, pad.distance_step_m) == (0.002, 0.002)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[gripper.pad]\nradius=1", r"unknown key 'gripper\.pad\.radius'.*Did you mean 'radius_m'"),
+        ("[grasp]\ncount=1", r"unknown key 'grasp'.*Did you mean 'grasps'"),
+        ("[train]\nqwxz=1", r"unknown key 'train\.qwxz'.*Known keys: epochs"),
+        ("[gripper]\nfriction=-1", r"'gripper\.friction' = -1.*greater than 0"),
+        ("[grasps]\ncount='many'", r"'grasps\.count' = 'many'.*integer"),
+        ("[scenes]\nlevels=[0, 3]", r"levels go from 1 to 9"),
+        ("[gripper]\nsolver='magic'", r"'gripper\.solver' = 'magic'"),
+        ("seed = nan", r"'seed'"),
+        ("[gripper", r"is not valid TOML"),
+        ("[gripper.pad]\nseal_radius_m=0.1", r"must not exceed radius_m"),
+    ],
+)
+def test_what_is_wrong_is_said(tmp_path: Path, text: str, said: str) -> None:
+    with pytest.raises(ConfigError, match=said) as caught:
+        load(tmp_path, text)
+    assert str(tmp_path / "run.toml") in str(caught.value)
+
+
+def test_an_absent_run_names_those_there_are(tmp_path: Path) -> None:
+    (tmp_path / "ci").mkdir()
+    (tmp_path / "ci" / "run.toml").touch()
+    with pytest.raises(ConfigError, match=r"does not exist.*ci"):
+        load_run_config(tmp_path / "cii" / "run.toml")
+
+
+def test_the_tree_is_frozen() -> None:
+    with pytest.raises(ValidationError):
+        RunConfig().seed = 3  # type: ignore[misc]
+
+
+def test_a_digest_depends_on_values_of_its_sections_alone(tmp_path: Path) -> None:
+    plain = load(tmp_path, "")
+    spelled = load(tmp_path, f"[train]\nepochs = {RunConfig().train.epochs}")
+    other = load(tmp_path, "[train]\nepochs = 3")
+    assert section_digest(plain, ("train",)) == section_digest(spelled, ("train",))
+    assert section_digest(plain, ("train",)) != section_digest(other, ("train",))
+    assert section_digest(plain, ("grasps",)) == section_digest(other, ("grasps",))
+    assert section_digest(plain, ("recording.grasps",)) == section_digest(
+        other, ("recording.grasps",)
+    )

@@ -1,0 +1,45 @@
+"""Results come in the order of the items, whoever computes them."""
+
+import os
+import signal
+
+import pytest
+
+from pipeline.errors import SoftgripError
+from pipeline.execution import derive_seed, generator, run_in_order
+
+
+def square(x: int) -> int:
+    return x * x
+
+
+def kill_yourself(x: int) -> int:
+    os.kill(os.getpid(), signal.SIGKILL)
+    return x
+
+
+def complain(x: int) -> int:
+    raise SoftgripError(f"item {x} is bad", "Leave it out")
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_order_is_that_of_the_items(workers: int) -> None:
+    assert list(run_in_order(square, range(20), workers)) == [x * x for x in range(20)]
+
+
+def test_a_killed_worker_is_a_sentence_not_a_hang() -> None:
+    with pytest.raises(SoftgripError, match=r"worker process died.*WORKERS=1"):
+        list(run_in_order(kill_yourself, range(4), 2))
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_readable_failure_stays_readable_across_processes(workers: int) -> None:
+    with pytest.raises(SoftgripError, match=r"item 0 is bad\. Leave it out"):
+        list(run_in_order(complain, range(4), workers))
+
+
+def test_streams_differ_by_name_and_repeat() -> None:
+    assert derive_seed(1, "scene", "a") != derive_seed(1, "scene", "b")
+    assert derive_seed(1, "scene", "a") != derive_seed(2, "scene", "a")
+    assert derive_seed(1, "x", 12) == derive_seed(1, "x", "12")
+    assert generator(3, "x").random() == generator(3, "x").random()
