@@ -28,7 +28,7 @@ GRASPS = Stage(
     sharded=True,
 )
 SHARDS = Stage("shards", ("seed", "shards", "recording.clouds"), ("grasps",), sharded=True)
-TRAIN = Stage("train", ("seed", "network", "train", "recording.clouds"), ("shards",))
+TRAIN = Stage("train", ("seed", "network", "train", "gripper.pad", "recording.clouds"), ("shards",))
 EVALUATE = Stage(
     "evaluate",
     ("seed", "evaluate", "scenes", "camera", "gripper", "sensing", "recording.attempts"),
@@ -43,7 +43,8 @@ def inputs_of(stage: Stage, folder: RunFolder, mesh_dir: Path | None) -> dict[st
     """Name → file of everything a stage reads."""
     inputs = {f"{name}.mcap": folder.artifact(name) for name in stage.upstream}
     if stage is OBJECTS and mesh_dir is not None:
-        inputs |= {f"meshes/{path.name}": path for path in list_mesh_files(mesh_dir)}
+        files = list_mesh_files(mesh_dir)
+        inputs |= {f"meshes/{path.relative_to(mesh_dir).as_posix()}": path for path in files}
     return inputs
 
 
@@ -65,6 +66,9 @@ def key(stage: str, run: RunName = "default", mesh_dir: MeshDir = None) -> None:
         for change in context.key.differences(key_from_json(path.read_text())):
             logger.info("{}: {}", stage, change)
     publish_bytes(path, text.encode())
+    if STAGES[stage] is OBJECTS:
+        # What train and eval stay with when they are called without MESH_DIR.
+        publish_bytes(folder.state("mesh_dir"), str(mesh_dir or "").encode())
 
 
 @app.command()

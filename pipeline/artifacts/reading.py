@@ -42,8 +42,12 @@ class Artifact:
         self._reader = reader
         self.provenance = self._read_provenance()
 
-    def messages(self, kind: type[M], topic: str | None = None) -> Iterator[tuple[int, M]]:
+    def messages(
+        self, kind: type[M], topic: str | None = None, at_ns: int | None = None
+    ) -> Iterator[tuple[int, M]]:
         """(log_time_ns, message) of every message of a type, in log-time order.
+
+        topic : that topic alone. at_ns : that log time alone.
 
         Raises
         ------
@@ -54,7 +58,11 @@ class Artifact:
         if not topics:
             return
         with _named(self.path):
-            for schema, channel, message in self._reader.iter_messages(topics=topics):
+            for schema, channel, message in self._reader.iter_messages(
+                topics=topics,
+                starting_at=at_ns,
+                ending_before=None if at_ns is None else at_ns + 1,
+            ):
                 if schema is None or schema.name != wanted:
                     carried = "no schema" if schema is None else schema.name
                     raise ArtifactError(

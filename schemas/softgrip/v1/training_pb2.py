@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from schemas.softgrip.v1 import tensor_pb2 as schemas_dot_softgrip_dot_v1_dot_tensor__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\"schemas/softgrip/v1/training.proto\x12\x0bsoftgrip.v1\x1a schemas/softgrip/v1/tensor.proto\"R\n\x05\x45poch\x12\r\n\x05\x65poch\x18\x01 \x01(\r\x12\x12\n\ntrain_loss\x18\x02 \x01(\x01\x12\x0f\n\x07val_mae\x18\x03 \x01(\x01\x12\x15\n\rlearning_rate\x18\x04 \x01(\x01\"\xb6\x04\n\x0eTrainingResult\x12\x0e\n\x06layers\x18\x01 \x01(\r\x12\x10\n\x08\x63hannels\x18\x02 \x03(\r\x12\x12\n\nparameters\x18\x03 \x01(\x04\x12\x12\n\nbest_epoch\x18\x04 \x01(\r\x12\x10\n\x08test_mae\x18\x05 \x01(\x01\x12\x1a\n\x12mean_predictor_mae\x18\x06 \x01(\x01\x12\x42\n\x0c\x62\x61seline_mae\x18\x07 \x03(\x0b\x32,.softgrip.v1.TrainingResult.BaselineMaeEntry\x12J\n\x11test_mae_by_class\x18\x08 \x03(\x0b\x32/.softgrip.v1.TrainingResult.TestMaeByClassEntry\x12.\n\x11test_mae_by_tenth\x18\t \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12(\n\x0b\x63\x61libration\x18\n \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12)\n\x0ctest_quality\x18\x0b \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12,\n\x0ftest_prediction\x18\x0c \x01(\x0b\x32\x13.softgrip.v1.Tensor\x1a\x32\n\x10\x42\x61selineMaeEntry\x12\x0b\n\x03key\x18\x01 \x01(\t\x12\r\n\x05value\x18\x02 \x01(\x01:\x02\x38\x01\x1a\x35\n\x13TestMaeByClassEntry\x12\x0b\n\x03key\x18\x01 \x01(\t\x12\r\n\x05value\x18\x02 \x01(\x01:\x02\x38\x01\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\"schemas/softgrip/v1/training.proto\x12\x0bsoftgrip.v1\x1a schemas/softgrip/v1/tensor.proto\"e\n\x05\x45poch\x12\r\n\x05\x65poch\x18\x01 \x01(\r\x12\x12\n\ntrain_loss\x18\x02 \x01(\x01\x12\x0f\n\x07val_mae\x18\x03 \x01(\x01\x12\x15\n\rlearning_rate\x18\x04 \x01(\x01\x12\x11\n\ttrain_mae\x18\x05 \x01(\x01\"\xb6\x04\n\x0eTrainingResult\x12\x0e\n\x06layers\x18\x01 \x01(\r\x12\x10\n\x08\x63hannels\x18\x02 \x03(\r\x12\x12\n\nparameters\x18\x03 \x01(\x04\x12\x12\n\nbest_epoch\x18\x04 \x01(\r\x12\x10\n\x08test_mae\x18\x05 \x01(\x01\x12\x1a\n\x12mean_predictor_mae\x18\x06 \x01(\x01\x12\x42\n\x0c\x62\x61seline_mae\x18\x07 \x03(\x0b\x32,.softgrip.v1.TrainingResult.BaselineMaeEntry\x12J\n\x11test_mae_by_class\x18\x08 \x03(\x0b\x32/.softgrip.v1.TrainingResult.TestMaeByClassEntry\x12.\n\x11test_mae_by_tenth\x18\t \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12(\n\x0b\x63\x61libration\x18\n \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12)\n\x0ctest_quality\x18\x0b \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12,\n\x0ftest_prediction\x18\x0c \x01(\x0b\x32\x13.softgrip.v1.Tensor\x1a\x32\n\x10\x42\x61selineMaeEntry\x12\x0b\n\x03key\x18\x01 \x01(\t\x12\r\n\x05value\x18\x02 \x01(\x01:\x02\x38\x01\x1a\x35\n\x13TestMaeByClassEntry\x12\x0b\n\x03key\x18\x01 \x01(\t\x12\r\n\x05value\x18\x02 \x01(\x01:\x02\x38\x01\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -37,11 +37,11 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_TRAININGRESULT_TESTMAEBYCLASSENTRY']._loaded_options = None
   _globals['_TRAININGRESULT_TESTMAEBYCLASSENTRY']._serialized_options = b'8\001'
   _globals['_EPOCH']._serialized_start=85
-  _globals['_EPOCH']._serialized_end=167
-  _globals['_TRAININGRESULT']._serialized_start=170
-  _globals['_TRAININGRESULT']._serialized_end=736
-  _globals['_TRAININGRESULT_BASELINEMAEENTRY']._serialized_start=631
-  _globals['_TRAININGRESULT_BASELINEMAEENTRY']._serialized_end=681
-  _globals['_TRAININGRESULT_TESTMAEBYCLASSENTRY']._serialized_start=683
-  _globals['_TRAININGRESULT_TESTMAEBYCLASSENTRY']._serialized_end=736
+  _globals['_EPOCH']._serialized_end=186
+  _globals['_TRAININGRESULT']._serialized_start=189
+  _globals['_TRAININGRESULT']._serialized_end=755
+  _globals['_TRAININGRESULT_BASELINEMAEENTRY']._serialized_start=650
+  _globals['_TRAININGRESULT_BASELINEMAEENTRY']._serialized_end=700
+  _globals['_TRAININGRESULT_TESTMAEBYCLASSENTRY']._serialized_start=702
+  _globals['_TRAININGRESULT_TESTMAEBYCLASSENTRY']._serialized_end=755
 # @@protoc_insertion_point(module_scope)

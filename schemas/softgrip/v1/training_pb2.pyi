@@ -8,16 +8,18 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class Epoch(_message.Message):
-    __slots__ = ("epoch", "train_loss", "val_mae", "learning_rate")
+    __slots__ = ("epoch", "train_loss", "val_mae", "learning_rate", "train_mae")
     EPOCH_FIELD_NUMBER: _ClassVar[int]
     TRAIN_LOSS_FIELD_NUMBER: _ClassVar[int]
     VAL_MAE_FIELD_NUMBER: _ClassVar[int]
     LEARNING_RATE_FIELD_NUMBER: _ClassVar[int]
+    TRAIN_MAE_FIELD_NUMBER: _ClassVar[int]
     epoch: int
     train_loss: float
     val_mae: float
     learning_rate: float
-    def __init__(self, epoch: _Optional[int] = ..., train_loss: _Optional[float] = ..., val_mae: _Optional[float] = ..., learning_rate: _Optional[float] = ...) -> None: ...
+    train_mae: float
+    def __init__(self, epoch: _Optional[int] = ..., train_loss: _Optional[float] = ..., val_mae: _Optional[float] = ..., learning_rate: _Optional[float] = ..., train_mae: _Optional[float] = ...) -> None: ...
 
 class TrainingResult(_message.Message):
     __slots__ = ("layers", "channels", "parameters", "best_epoch", "test_mae", "mean_predictor_mae", "baseline_mae", "test_mae_by_class", "test_mae_by_tenth", "calibration", "test_quality", "test_prediction")

@@ -1,0 +1,81 @@
+"""Catalogue objects ↔ softgrip.v1.CatalogueObject."""
+
+from pathlib import Path
+from typing import cast
+
+import numpy as np
+
+from pipeline.artifacts.reading import open_artifact
+from pipeline.artifacts.tensors import from_tensor, to_tensor
+from pipeline.geometry.catalogue import CatalogueObject
+from pipeline.geometry.mesh import Mesh
+from pipeline.geometry.mesh_files import UnitSource
+from pipeline.geometry.shape import ShapeClass
+from schemas.softgrip.v1 import objects_pb2
+
+TOPIC = "/objects"
+REFUSED_TOPIC = "/refused"
+
+
+def object_message(item: CatalogueObject, split: str) -> objects_pb2.CatalogueObject:
+    """The message of one object."""
+    return objects_pb2.CatalogueObject(
+        name=item.name,
+        split=split,
+        source=item.source,
+        source_sha256=item.source_sha256,
+        unit=item.unit,
+        unit_origin=item.unit_known_by,
+        repairs=item.repairs,
+        scale=item.scale,
+        extent_m=item.target_extent_m,
+        area_m2=item.area_m2,
+        volume_m3=item.volume_m3,
+        nsvr=item.nsvr,
+        shape_class=item.shape_class,
+        mass_kg=item.mass_kg,
+        inertia_kg_m2=to_tensor(item.inertia_kg_m2),
+        mesh=_mesh_message(item.mesh),
+        convex_parts=[_mesh_message(part) for part in item.convex_parts],
+    )
+
+
+def object_of(message: objects_pb2.CatalogueObject) -> CatalogueObject:
+    """The object of a message."""
+    return CatalogueObject(
+        name=message.name,
+        source=message.source,
+        source_sha256=message.source_sha256,
+        unit=message.unit,
+        unit_known_by=cast(UnitSource, message.unit_origin),
+        repairs=tuple(message.repairs),
+        scale=message.scale,
+        target_extent_m=message.extent_m,
+        area_m2=message.area_m2,
+        volume_m3=message.volume_m3,
+        nsvr=message.nsvr,
+        shape_class=ShapeClass(message.shape_class),
+        mass_kg=message.mass_kg,
+        centre_of_mass_m=np.zeros(3),
+        inertia_kg_m2=from_tensor(message.inertia_kg_m2),
+        mesh=_mesh(message.mesh),
+        convex_parts=tuple(_mesh(part) for part in message.convex_parts),
+    )
+
+
+def read_objects(path: Path) -> dict[str, tuple[CatalogueObject, str]]:
+    """Name → (object, split) of an objects artifact."""
+    with open_artifact(path) as artifact:
+        messages = [m for _, m in artifact.messages(objects_pb2.CatalogueObject)]
+    return {message.name: (object_of(message), message.split) for message in messages}
+
+
+def _mesh_message(mesh: Mesh) -> objects_pb2.TriangleMesh:
+    return objects_pb2.TriangleMesh(
+        vertices_m=to_tensor(mesh.vertices_m.astype(np.float64)),
+        faces=to_tensor(mesh.faces.astype(np.uint32)),
+    )
+
+
+def _mesh(message: objects_pb2.TriangleMesh) -> Mesh:
+    return Mesh(from_tensor(message.vertices_m), from_tensor(message.faces).astype(np.int64))

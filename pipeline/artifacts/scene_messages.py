@@ -1,0 +1,197 @@
+"""Clutter scenes ↔ softgrip.v1.Scene, their images on foxglove topics beside it.
+
+Scene i lies at log time i seconds: its record on ``/scenes``, and for every
+viewpoint colour, depth and segmentation as foxglove.RawImage, the camera as
+foxglove.CameraCalibration, and all poses as foxglove.FrameTransforms, so that
+a viewer shows the file as it is.
+"""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
+from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
+from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
+from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
+from google.protobuf.timestamp_pb2 import Timestamp
+
+from pipeline.artifacts.reading import Artifact, open_artifact
+from pipeline.artifacts.tensors import from_tensor, to_tensor
+from pipeline.artifacts.writing import ArtifactWriter
+from pipeline.clutter.levels import level_of
+from pipeline.clutter.scene import ClutterScene, PlacedObject
+from pipeline.errors import ArtifactError
+from pipeline.geometry.transforms import position_quaternion
+from pipeline.sensing.cameras import PinholeCamera
+from pipeline.sensing.view import CameraView
+from schemas.softgrip.v1 import scenes_pb2
+
+TOPIC = "/scenes"
+NS_PER_SCENE = 1_000_000_000
+WORLD_FRAME = "world"
+
+# Name of an image → (encoding of foxglove.RawImage, dtype).
+IMAGES = {"depth": ("32FC1", "<f4"), "colour": ("rgb8", "u1"), "segmentation": ("16UC1", "<u2")}
+
+
+def write_scene(artifact: ArtifactWriter, index: int, scene: ClutterScene, renderer: str) -> None:
+    """Append scene ``index`` and its images."""
+    time_ns = index * NS_PER_SCENE
+    artifact.write(TOPIC, scene_message(scene, renderer), time_ns)
+    artifact.write("/tf", _transforms(scene, time_ns), time_ns)
+    for view in scene.views:
+        topic = f"/scene/{view.camera.name}"
+        artifact.write(f"{topic}/calibration", _calibration(view.camera, time_ns), time_ns)
+        for name, image in _images(view).items():
+            artifact.write(f"{topic}/{name}", _raw(image, name, view.camera, time_ns), time_ns)
+
+
+def scene_message(scene: ClutterScene, renderer: str) -> scenes_pb2.Scene:
+    """The record of a scene, images left out."""
+    shape_class, distribution = level_of(scene.level)
+    return scenes_pb2.Scene(
+        scene_id=scene.scene_id,
+        level=scene.level,
+        shape_class=shape_class,
+        distribution=distribution,
+        split=scene.split,
+        seed=scene.seed,
+        objects=[
+            scenes_pb2.PlacedObject(
+                object_name=placed.object_name,
+                body_id=placed.body_id,
+                world_from_object=to_tensor(placed.world_from_object),
+                gap_m=float(gap),
+            )
+            for placed, gap in zip(scene.objects, scene.gaps_m, strict=True)
+        ],
+        contacts=to_tensor(np.asarray(scene.contacts, dtype=np.uint32).reshape(-1, 2)),
+        settle_time_s=scene.settle_time_s,
+        renderer=renderer,
+        viewpoints=[
+            scenes_pb2.Viewpoint(
+                name=view.camera.name,
+                width_px=view.camera.width_px,
+                height_px=view.camera.height_px,
+                intrinsics=to_tensor(view.camera.intrinsics),
+                world_from_camera=to_tensor(view.camera.world_from_camera),
+            )
+            for view in scene.views
+        ],
+    )
+
+
+def scene_count(path: Path) -> int:
+    """How many scenes an artifact holds."""
+    with open_artifact(path) as artifact:
+        return artifact.counts()[TOPIC][1]
+
+
+def read_scene(path: Path, index: int) -> ClutterScene:
+    """Scene ``index`` with its images."""
+    with open_artifact(path) as artifact:
+        for time_ns, message in artifact.messages(scenes_pb2.Scene, at_ns=index * NS_PER_SCENE):
+            return _scene(artifact, message, time_ns)
+    raise ArtifactError(f"{path} holds no scene {index}", "Make the scenes again")
+
+
+def read_scenes(path: Path) -> Iterator[ClutterScene]:
+    """All scenes, in order, one in memory at a time."""
+    for index in range(scene_count(path)):
+        yield read_scene(path, index)
+
+
+def _scene(artifact: Artifact, message: scenes_pb2.Scene, time_ns: int) -> ClutterScene:
+    contacts = from_tensor(message.contacts)
+    return ClutterScene(
+        scene_id=message.scene_id,
+        level=message.level,
+        split=message.split,
+        seed=message.seed,
+        objects=tuple(
+            PlacedObject(p.object_name, p.body_id, from_tensor(p.world_from_object))
+            for p in message.objects
+        ),
+        gaps_m=np.array([placed.gap_m for placed in message.objects]),
+        contacts=tuple((int(a), int(b)) for a, b in contacts),
+        settle_time_s=message.settle_time_s,
+        views=tuple(_view(artifact, viewpoint, time_ns) for viewpoint in message.viewpoints),
+    )
+
+
+def _view(artifact: Artifact, viewpoint: scenes_pb2.Viewpoint, time_ns: int) -> CameraView:
+    camera = PinholeCamera(
+        name=viewpoint.name,
+        width_px=viewpoint.width_px,
+        height_px=viewpoint.height_px,
+        intrinsics=from_tensor(viewpoint.intrinsics),
+        world_from_camera=from_tensor(viewpoint.world_from_camera),
+    )
+    images = {}
+    for name, (encoding, dtype) in IMAGES.items():
+        topic = f"/scene/{viewpoint.name}/{name}"
+        for _, raw in artifact.messages(RawImage, topic, at_ns=time_ns):
+            if raw.encoding != encoding:
+                raise ArtifactError(
+                    f"{artifact.path}: {topic} is {raw.encoding}, expected {encoding}",
+                    "Make the scenes again",
+                )
+            shape = (raw.height, raw.width) + ((3,) if name == "colour" else ())
+            images[name] = np.frombuffer(raw.data, dtype).reshape(shape)
+    return CameraView(camera, images["depth"], images["colour"], images["segmentation"])
+
+
+def _images(view: CameraView) -> dict[str, np.ndarray]:
+    return {
+        "depth": view.depth_m,
+        "colour": view.colour,
+        "segmentation": view.segmentation,
+    }
+
+
+def _raw(image: np.ndarray, name: str, camera: PinholeCamera, time_ns: int) -> RawImage:
+    encoding, dtype = IMAGES[name]
+    data = np.ascontiguousarray(image, dtype=dtype)
+    return RawImage(
+        timestamp=_stamp(time_ns),
+        frame_id=camera.name,
+        width=camera.width_px,
+        height=camera.height_px,
+        encoding=encoding,
+        step=data.strides[0],
+        data=data.tobytes(),
+    )
+
+
+def _calibration(camera: PinholeCamera, time_ns: int) -> CameraCalibration:
+    projection = np.hstack([camera.intrinsics, np.zeros((3, 1))])
+    return CameraCalibration(
+        timestamp=_stamp(time_ns),
+        frame_id=camera.name,
+        width=camera.width_px,
+        height=camera.height_px,
+        K=camera.intrinsics.ravel().tolist(),
+        R=np.eye(3).ravel().tolist(),
+        P=projection.ravel().tolist(),
+    )
+
+
+def _transforms(scene: ClutterScene, time_ns: int) -> FrameTransforms:
+    poses = {f"object_{p.body_id:02d}": p.world_from_object for p in scene.objects}
+    poses |= {view.camera.name: view.camera.world_from_camera for view in scene.views}
+    transforms = []
+    for name, world_from_frame in poses.items():
+        position, (w, x, y, z) = position_quaternion(world_from_frame)
+        transform = FrameTransform(
+            timestamp=_stamp(time_ns), parent_frame_id=WORLD_FRAME, child_frame_id=name
+        )
+        transform.translation.x, transform.translation.y, transform.translation.z = position
+        transform.rotation.w, transform.rotation.x = w, x
+        transform.rotation.y, transform.rotation.z = y, z
+        transforms.append(transform)
+    return FrameTransforms(transforms=transforms)
+
+
+def _stamp(time_ns: int) -> Timestamp:
+    return Timestamp(seconds=time_ns // 10**9, nanos=time_ns % 10**9)

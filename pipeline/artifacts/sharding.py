@@ -1,0 +1,88 @@
+"""Artifacts in many files: shard names, what of them is already there, and their index."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.artifacts.provenance import Provenance
+from pipeline.artifacts.publishing import file_sha256
+from pipeline.artifacts.reading import open_artifact, read_provenance
+from pipeline.artifacts.tensors import to_tensor
+from pipeline.artifacts.writing import ArtifactWriter
+from pipeline.errors import ArtifactError
+from schemas.softgrip.v1.grasps_pb2 import ShardEntry, ShardIndex
+
+INDEX_TOPIC = "/index"
+
+
+def shard_path(folder: Path, index: int, count: int) -> Path:
+    """``<folder>/<nnnnn>-of-<nnnnn>.mcap``."""
+    return folder / f"{index:05d}-of-{count:05d}.mcap"
+
+
+def is_current(path: Path, key: str) -> bool:
+    """Whether a shard is there, whole, and made from what is there now."""
+    if not path.is_file():
+        return False
+    try:
+        return read_provenance(path).key == key
+    except ArtifactError:
+        return False  # damaged or of another version: made again
+
+
+def shard_entry(path: Path, relative_to: Path, samples: int, split: str) -> ShardEntry:
+    """What the index says of one shard."""
+    name = path.relative_to(relative_to).as_posix()
+    return ShardEntry(path=name, sha256=file_sha256(path), samples=samples, split=split)
+
+
+def write_index(
+    path: Path, provenance: Provenance, entries: list[ShardEntry], quality_histogram: np.ndarray
+) -> None:
+    """Publish the index last, and clear the folder of shards it does not name."""
+    folder = path.with_suffix("")
+    named = {path.parent / entry.path for entry in entries}
+    for stray in sorted(folder.rglob("*.mcap")):
+        if stray not in named:
+            stray.unlink()
+    index = ShardIndex(
+        shards=entries,
+        samples=sum(entry.samples for entry in entries),
+        quality_histogram=to_tensor(quality_histogram.astype(np.int64)),
+    )
+    with ArtifactWriter(path, provenance) as artifact:
+        artifact.write(INDEX_TOPIC, index, log_time_ns=0)
+
+
+def read_index(path: Path) -> ShardIndex:
+    """The index of a sharded artifact."""
+    with open_artifact(path) as artifact:
+        return artifact.one(ShardIndex)
+
+
+def listed_shards(path: Path, splits: Iterable[str] = ("train", "val", "test")) -> list[Path]:
+    """The shards of some splits, in order.
+
+    Raises
+    ------
+    ArtifactError : one that the index names is missing, or a name leads out of the folder.
+    """
+    wanted = set(splits)
+    shards = []
+    for entry in read_index(path).shards:
+        shard = path.parent / entry.path
+        if not shard.resolve().is_relative_to(path.parent.resolve()):
+            raise ArtifactError(
+                f"{path} names '{entry.path}', which leads out of its folder",
+                "The index is damaged: make it again",
+            )
+        if entry.split not in wanted:
+            continue
+        if not shard.is_file():
+            raise ArtifactError(
+                f"{shard} is missing, though {path} names it",
+                "Run the stage that makes it again: it makes the missing shard alone",
+            )
+        shards.append(shard)
+    return shards

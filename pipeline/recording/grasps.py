@@ -1,0 +1,162 @@
+"""grasps.rrd: the pad draped on its object, the wrench against its limits, labels in all.
+
+One step of the timeline a grasp, from the best to the worst. The close-up is in GCS (origin at
+first touch, +z out along the approach), so that grasps can be compared by eye.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from jaxtyping import Float
+
+from pipeline.artifacts.grasp_messages import GraspOrigin, LabelledGrasps
+from pipeline.clutter.scene import ClutterScene
+from pipeline.geometry.mesh import Mesh
+from pipeline.geometry.transforms import invert
+from pipeline.gripper.balancing import quality_histogram
+from pipeline.gripper.pad import Pad
+from pipeline.recording import colours
+from pipeline.recording.recording import step
+from pipeline.recording.shapes import shown_mesh
+
+TIMELINE = "grasp"
+CONTACT = colours.PALETTE[2]
+LIFTED = colours.PALETTE[5]
+LIFT_M = 3e-4  # the pad is drawn this much above what it lies on
+ARROW_M = 0.04  # a full seal's force is drawn this long
+NEAR_M = 0.12  # other objects are drawn when this near
+
+
+@dataclass(frozen=True)
+class ShownGrasp:
+    """One grasp of the recording. pad_height_m : (v,) draped pad, z in GCS at first touch."""
+
+    scene: ClutterScene
+    origin: GraspOrigin
+    grasps: LabelledGrasps
+    row: int
+    pad_height_m: Float[np.ndarray, " v"]
+
+
+def blueprint() -> rrb.Blueprint:
+    """Opens on the best grasp: the pad on its object beside figures and limits."""
+    return rrb.Blueprint(
+        rrb.Horizontal(
+            rrb.Spatial3DView(
+                origin="/world",
+                name="Pad (green: in contact), cloud and wrench, in GCS",
+            ),
+            rrb.Vertical(
+                rrb.TextDocumentView(origin="/notes/grasp", name="Grasp"),
+                rrb.BarChartView(origin="/curves/limits", name="Share of each limit, Eq. (8)-(11)"),
+                rrb.TimeSeriesView(origin="/curves/label", name="q and p, best to worst"),
+                rrb.BarChartView(origin="/curves/quality", name="All labels, q in tenths"),
+                row_shares=[3, 2, 2, 2],
+            ),
+            column_shares=[3, 2],
+        ),
+        rrb.TimePanel(timeline=TIMELINE, state="collapsed"),
+        collapse_panels=True,
+    )
+
+
+def show_grasps(
+    stream: rr.RecordingStream,
+    grasps: Sequence[ShownGrasp],
+    meshes: Mapping[str, Mesh],
+    pad: Pad,
+    quality: Float[np.ndarray, " n"],
+) -> None:
+    """Log the grasps from the best to the worst; ``quality`` are the labels of all grasps."""
+    stream.log("curves/quality", rr.BarChart(quality_histogram(quality)), static=True)
+    ordered = sorted(grasps, key=lambda shown: -shown.grasps.quality[shown.row])
+    for number, shown in enumerate(ordered):
+        step(stream, TIMELINE, number)
+        _show_surroundings(stream, shown.scene, shown.grasps, shown.row, meshes)
+        _show_pad(stream, shown, pad)
+        _show_figures(stream, shown.origin, shown.grasps, shown.row)
+
+
+def _show_surroundings(
+    stream: rr.RecordingStream,
+    scene: ClutterScene,
+    grasps: LabelledGrasps,
+    row: int,
+    meshes: Mapping[str, Mesh],
+) -> None:
+    """The target and its near neighbours, in GCS."""
+    gripper_from_world = invert(grasps.world_from_gripper[row])
+    stream.log("world/objects", rr.Clear(recursive=True))
+    for placed in scene.objects:
+        mesh = meshes[placed.object_name].transformed(gripper_from_world @ placed.world_from_object)
+        target = placed.body_id == grasps.body_id[row]
+        if not target and np.linalg.norm(mesh.vertices_m, axis=1).min() > NEAR_M:
+            continue
+        colour = colours.PALETTE[1] if target else colours.PALETTE[7]
+        stream.log(f"world/objects/{placed.body_id:02d}", shown_mesh(mesh, colour))
+
+
+def _show_pad(stream: rr.RecordingStream, shown: ShownGrasp, pad: Pad) -> None:
+    """The draped pad, coloured where it touches; the cloud; the wrench."""
+    grasps, row = shown.grasps, shown.row
+    contact = grasps.contact_mask[row]
+    vertices = np.column_stack([pad.vertices_xy_m, shown.pad_height_m + LIFT_M])
+    sealing = contact[pad.triangles].all(axis=1)
+    per_vertex = np.where(contact[:, None], CONTACT, LIFTED).astype(np.uint8)
+    stream.log(
+        "world/pad",
+        rr.Mesh3D(
+            vertex_positions=vertices,
+            triangle_indices=np.concatenate([pad.triangles[sealing], pad.triangles[~sealing]]),
+            vertex_colors=per_vertex,
+        ),
+    )
+    seen = grasps.cloud_mask[row]
+    points = grasps.cloud[row][seen].astype(np.float64) * pad.radius_m
+    points[:, 2] -= grasps.touch_height_m[row]
+    stream.log("world/cloud", rr.Points3D(points, radii=5e-4, colors=[0, 0, 0]))
+    f_x, f_y, f_z, _ = grasps.wrench[row]
+    # The vacuum pulls the object up, out along +z.
+    stream.log(
+        "world/wrench",
+        rr.Arrows3D(
+            origins=[[0, 0, 0.01]] * 2,
+            vectors=ARROW_M * np.array([[0, 0, f_z], [f_x, f_y, 0]]),
+            colors=[colours.PALETTE[4], colours.PALETTE[6]],
+            labels=["F_z", "F_xy"],
+            radii=6e-4,
+        ),
+    )
+
+
+def _show_figures(
+    stream: rr.RecordingStream, origin: GraspOrigin, grasps: LabelledGrasps, row: int
+) -> None:
+    """q, p, GW and how much of each limit is used."""
+    quality, pressure = float(grasps.quality[row]), float(grasps.pressure[row])
+    stream.log("curves/label/q", rr.Scalars(quality))
+    stream.log("curves/label/p", rr.Scalars(pressure))
+    slack = grasps.limit_slack[row]
+    # Slacks come in pairs, upper and lower: their sum is the width of the limit.
+    width = np.maximum(slack[0::2] + slack[1::2], 1e-12)
+    used = 1.0 - 2.0 * np.minimum(slack[0::2], slack[1::2]) / width
+    stream.log("curves/limits", rr.BarChart(used))
+    wrench = ", ".join(f"{value:+.3f}" for value in grasps.wrench[row])
+    stream.log(
+        "notes/grasp",
+        rr.TextDocument(
+            f"**q = {quality:.3f}**, p = {pressure:.3f}, "
+            f"{origin.status_names[int(grasps.status[row])]} "
+            f"in {int(grasps.iterations[row])} iterations\n\n"
+            f"| | |\n|-|-|\n"
+            f"| object | {origin.object_names[int(grasps.object_index[row])]} |\n"
+            f"| scene | {origin.scene_id}, level {origin.level}, {origin.split} |\n"
+            f"| GW = F_x, F_y, F_z, T_z | {wrench} |\n"
+            f"| tilt off the normal | {np.degrees(float(grasps.tilt_rad[row])):.1f}° |\n"
+            f"| proposed as | {origin.proposal_names[int(grasps.proposal[row])]} |\n",
+            media_type=rr.MediaType.MARKDOWN,
+        ),
+    )

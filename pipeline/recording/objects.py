@@ -1,0 +1,102 @@
+"""objects.rrd: the catalogue laid out, and each object with its convex parts and its NSVR."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+from jaxtyping import Float
+
+from pipeline.geometry.catalogue import CatalogueObject
+from pipeline.geometry.mesh import Mesh
+from pipeline.geometry.shape import COMPLEX_FROM, TYPICAL_FROM
+from pipeline.recording import colours
+from pipeline.recording.recording import step
+from pipeline.recording.shapes import shown_mesh
+
+TIMELINE = "object"
+SPACING_M = 0.22
+
+
+def blueprint() -> rrb.Blueprint:
+    """Opens on the whole catalogue; stepping through shows one object after the other."""
+    return rrb.Blueprint(
+        rrb.Horizontal(
+            rrb.Spatial3DView(origin="/world/catalogue", name="Catalogue, coloured by class"),
+            rrb.Vertical(
+                rrb.Spatial3DView(origin="/world/object", name="Object and its convex parts"),
+                rrb.TimeSeriesView(origin="/curves/nsvr", name="NSVR and its two thresholds"),
+                rrb.TextDocumentView(origin="/notes/object", name="Facts"),
+                row_shares=[4, 3, 3],
+            ),
+            column_shares=[3, 2],
+        ),
+        rrb.TimePanel(timeline=TIMELINE, state="collapsed"),
+        collapse_panels=True,
+    )
+
+
+def show_catalogue(
+    stream: rr.RecordingStream, items: Sequence[tuple[CatalogueObject, str]]
+) -> None:
+    """Every object on a grid, and a step of the timeline for each, by growing NSVR."""
+    columns = int(np.ceil(np.sqrt(len(items))))
+    for threshold, name in (
+        (TYPICAL_FROM, "typical_from"),
+        (COMPLEX_FROM, "complex_from"),
+    ):
+        stream.log(f"curves/nsvr/{name}", rr.SeriesLines(widths=1), static=True)
+        for index in range(len(items)):
+            step(stream, TIMELINE, index)
+            stream.log(f"curves/nsvr/{name}", rr.Scalars(threshold))
+    stream.log("curves/nsvr/object", rr.SeriesPoints(marker_sizes=4), static=True)
+    for index, (item, split) in enumerate(sorted(items, key=lambda pair: pair[0].nsvr)):
+        place = SPACING_M * np.array([index % columns, -(index // columns), 0.0])
+        colour = colours.SHAPE_CLASS[item.shape_class]
+        stream.log(
+            f"world/catalogue/{item.name}", shown_mesh(moved(item.mesh, place), colour), static=True
+        )
+        stream.log(
+            f"world/catalogue/{item.name}/label",
+            rr.Points3D(
+                [place + np.array([0.0, 0.0, 0.7 * item.mesh.extents_m[2]])],
+                labels=[f"{item.name} {item.nsvr:.2f}"],
+                radii=0.0005,
+                show_labels=len(items) <= 20,
+            ),
+            static=True,
+        )
+        step(stream, TIMELINE, index)
+        _show_object(stream, item, split)
+
+
+def _show_object(stream: rr.RecordingStream, item: CatalogueObject, split: str) -> None:
+    stream.log("world/object", rr.Clear(recursive=True))
+    stream.log("world/object/mesh", shown_mesh(item.mesh, colours.SHAPE_CLASS[item.shape_class]))
+    beside = np.array([1.3 * item.mesh.extents_m[0] + 0.02, 0.0, 0.0])
+    for number, part in enumerate(item.convex_parts):
+        stream.log(
+            f"world/object/parts/{number}",
+            shown_mesh(moved(part, beside), colours.by_index(number)),
+        )
+    stream.log("curves/nsvr/object", rr.Scalars(item.nsvr))
+    repairs = "; ".join(item.repairs) or "none: closed as it came"
+    stream.log(
+        "notes/object",
+        rr.TextDocument(
+            f"**{item.name}** ({split})\n\n"
+            f"| | |\n|-|-|\n"
+            f"| class | {item.shape_class}, NSVR {item.nsvr:.3f} |\n"
+            f"| longest extent | {1e3 * item.target_extent_m:.1f} mm (scale {item.scale:.4g}) |\n"
+            f"| mass | {1e3 * item.mass_kg:.0f} g |\n"
+            f"| faces, convex parts | {len(item.mesh.faces)}, {len(item.convex_parts)} |\n"
+            f"| source | {item.source}, unit {item.unit} ({item.unit_known_by}) |\n"
+            f"| repairs | {repairs} |\n",
+            media_type=rr.MediaType.MARKDOWN,
+        ),
+    )
+
+
+def moved(mesh: Mesh, offset_m: Float[np.ndarray, " 3"]) -> Mesh:
+    """The mesh elsewhere, so that things stand side by side."""
+    return Mesh(mesh.vertices_m + offset_m, mesh.faces)

@@ -1,0 +1,104 @@
+"""scenes.rrd: each clutter in 3-D with its cameras, pictures, cloud and table of facts."""
+
+from collections.abc import Mapping
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from pipeline.clutter.levels import level_of
+from pipeline.clutter.scene import ClutterScene
+from pipeline.geometry.mesh import Mesh
+from pipeline.recording import colours
+from pipeline.recording.recording import step
+from pipeline.recording.shapes import shown_mesh, shown_pose
+from pipeline.sensing.cameras import points_of_depth
+from pipeline.sensing.view import CameraView
+
+TIMELINE = "scene"
+FRUSTUM_M = 0.15
+CLOUD_EVERY = 3  # every third pixel a side: a ninth of the points
+
+
+def blueprint() -> rrb.Blueprint:
+    """Opens on the scene in 3-D, with the first camera's pictures and the facts beside it."""
+    first = "/world/camera_0"
+    return rrb.Blueprint(
+        rrb.Horizontal(
+            rrb.Spatial3DView(origin="/world", name="Scene, cameras and coloured cloud"),
+            rrb.Vertical(
+                rrb.Spatial2DView(
+                    origin=f"{first}/colour", contents=f"{first}/colour", name="Colour"
+                ),
+                rrb.Spatial2DView(origin=f"{first}/depth", contents=f"{first}/depth", name="Depth"),
+                rrb.Spatial2DView(
+                    origin=f"{first}/segmentation",
+                    contents=f"{first}/segmentation",
+                    name="Segmentation",
+                ),
+                rrb.TextDocumentView(origin="/notes/scene", name="Level, gaps, NSVR"),
+            ),
+            column_shares=[3, 2],
+        ),
+        rrb.TimePanel(timeline=TIMELINE, state="collapsed"),
+        collapse_panels=True,
+    )
+
+
+def show_scene(
+    stream: rr.RecordingStream,
+    number: int,
+    scene: ClutterScene,
+    meshes: Mapping[str, Mesh],
+    nsvr: Mapping[str, float],
+) -> None:
+    """One step of the recording."""
+    step(stream, TIMELINE, number)
+    stream.log("world/objects", rr.Clear(recursive=True))
+    for placed in scene.objects:
+        path = f"world/objects/{placed.body_id:02d}"
+        mesh = meshes[placed.object_name]
+        stream.log(path, shown_mesh(mesh, colours.by_index(placed.body_id)))
+        stream.log(path, shown_pose(placed.world_from_object))
+    for index, view in enumerate(scene.views):
+        _show_view(stream, f"world/camera_{index}", view)
+    stream.log(
+        "notes/scene", rr.TextDocument(_facts(scene, nsvr), media_type=rr.MediaType.MARKDOWN)
+    )
+
+
+def _show_view(stream: rr.RecordingStream, path: str, view: CameraView) -> None:
+    camera = view.camera
+    stream.log(path, shown_pose(camera.world_from_camera))
+    stream.log(
+        path,
+        rr.Pinhole(
+            image_from_camera=camera.intrinsics,
+            resolution=[camera.width_px, camera.height_px],
+            camera_xyz=rr.ViewCoordinates.RDF,
+            image_plane_distance=FRUSTUM_M,
+        ),
+    )
+    stream.log(f"{path}/colour", rr.Image(view.colour).compress(jpeg_quality=90))
+    stream.log(f"{path}/depth", rr.DepthImage(view.depth_m.astype(np.float16), meter=1.0))
+    stream.log(f"{path}/segmentation", rr.SegmentationImage(view.segmentation))
+    points, rows, columns = points_of_depth(view.depth_m, camera, CLOUD_EVERY)
+    stream.log(
+        f"world/cloud/{camera.name}",
+        rr.Points3D(points, colors=view.colour[rows, columns], radii=0.0012),
+    )
+
+
+def _facts(scene: ClutterScene, nsvr: Mapping[str, float]) -> str:
+    shape_class, distribution = level_of(scene.level)
+    rows = "\n".join(
+        f"| {placed.body_id} | {placed.object_name} | {nsvr[placed.object_name]:.2f} "
+        f"| {1e3 * gap:.1f} |"
+        for placed, gap in zip(scene.objects, scene.gaps_m, strict=True)
+    )
+    return (
+        f"**Level {scene.level}: {shape_class}, {distribution}** ({scene.split})\n\n"
+        f"{scene.scene_id}, {len(scene.contacts)} contacts, "
+        f"settled in {scene.settle_time_s:.2f} s\n\n"
+        f"| id | object | NSVR | nearest gap in mm |\n|-|-|-|-|\n{rows}\n"
+    )

@@ -1,0 +1,108 @@
+"""train.rrd: curves, calibration, and the samples the network is most wrong about."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from pipeline.artifacts.sample_messages import Samples
+from pipeline.artifacts.training_messages import TestFigures
+from pipeline.network.training import EpochMetrics
+from pipeline.recording import colours
+from pipeline.recording.recording import step
+
+TIMELINE = "epoch"
+SHEET_COLUMNS = 10
+SHEET_SPACING = 3.0  # in r_G: clouds are 2.4 wide
+SCATTER_POINTS = 5000
+
+
+def blueprint() -> rrb.Blueprint:
+    """Opens on the curves, with calibration and the worst samples beside."""
+    return rrb.Blueprint(
+        rrb.Horizontal(
+            rrb.Vertical(
+                rrb.TimeSeriesView(origin="/curves/error", name="mean |q-hat - q| by epoch"),
+                rrb.TimeSeriesView(origin="/curves/rate", name="learning rate"),
+                rrb.TextDocumentView(origin="/notes/result", name="Result on held-out objects"),
+                row_shares=[3, 1, 3],
+            ),
+            rrb.Vertical(
+                rrb.Spatial2DView(
+                    origin="/curves/calibration", name="q-hat (up) against q (right), test split"
+                ),
+                rrb.Spatial3DView(origin="/world/worst", name="Worst test samples: q / q-hat"),
+            ),
+        ),
+        rrb.TimePanel(timeline=TIMELINE, state="collapsed"),
+        collapse_panels=True,
+    )
+
+
+def show_training(
+    stream: rr.RecordingStream,
+    history: Sequence[EpochMetrics],
+    figures: TestFigures,
+    test_set: Samples,
+    wanted: int,
+) -> None:
+    """Log the curve, the calibration and the ``wanted`` worst samples."""
+    for metrics in history:
+        step(stream, TIMELINE, metrics.epoch)
+        stream.log("curves/error/train", rr.Scalars(metrics.train_mae))
+        stream.log("curves/error/val", rr.Scalars(metrics.val_mae))
+        stream.log("curves/error/mean_predictor", rr.Scalars(figures.mean_predictor_mae))
+        stream.log("curves/rate", rr.Scalars(metrics.learning_rate))
+    _show_calibration(stream, figures)
+    _show_worst(stream, figures, test_set, wanted)
+    classes = "\n".join(f"| {name} | {error:.4f} |" for name, error in figures.by_class.items())
+    stream.log(
+        "notes/result",
+        rr.TextDocument(
+            "| mean &#124;q-hat - q&#124; | |\n|-|-|\n"
+            f"| **GA-CNN** | **{figures.mae:.4f}** |\n"
+            f"| seal ratio alone | {figures.seal_ratio_mae:.4f} |\n"
+            f"| mean predictor | {figures.mean_predictor_mae:.4f} |\n{classes}\n",
+            media_type=rr.MediaType.MARKDOWN,
+        ),
+        static=True,
+    )
+
+
+def _show_calibration(stream: rr.RecordingStream, figures: TestFigures) -> None:
+    """Test samples as dots, the tenths' means as a line; upwards is y = 1 - q-hat on a picture."""
+    every = max(1, len(figures.quality) // SCATTER_POINTS)
+    dots = np.column_stack([figures.quality, 1.0 - figures.predicted])[::every]
+    stream.log(
+        "curves/calibration/samples",
+        rr.Points2D(dots, radii=0.003, colors=colours.PALETTE[1]),
+        static=True,
+    )
+    diagonal = rr.LineStrips2D([[[0, 1], [1, 0]]], radii=0.002, colors=[120, 120, 120])
+    stream.log("curves/calibration/perfect", diagonal, static=True)
+    tenths = [(q, 1.0 - p) for p, q, _ in figures.calibration if p is not None and q is not None]
+    stream.log(
+        "curves/calibration/tenths",
+        rr.LineStrips2D([tenths], radii=0.004, colors=colours.PALETTE[5]),
+        static=True,
+    )
+
+
+def _show_worst(
+    stream: rr.RecordingStream, figures: TestFigures, test_set: Samples, wanted: int
+) -> None:
+    error = np.abs(figures.predicted - figures.quality)
+    for number, index in enumerate(np.argsort(-error, kind="stable")[:wanted]):
+        shift = SHEET_SPACING * np.array([number % SHEET_COLUMNS, -(number // SHEET_COLUMNS), 0])
+        points = test_set.cloud[index][test_set.cloud_mask[index]].astype(np.float32) + shift
+        colour = colours.by_value(figures.quality[index : index + 1])
+        stream.log(
+            f"world/worst/{number:03d}", rr.Points3D(points, colors=colour, radii=0.04), static=True
+        )
+        label = f"{figures.quality[index]:.2f} / {figures.predicted[index]:.2f}"
+        stream.log(
+            f"world/worst/{number:03d}/label",
+            rr.Points3D([shift + np.array([0, 1.4, 0])], labels=[label], radii=0.01),
+            static=True,
+        )

@@ -1,0 +1,395 @@
+"""Stage 3, grasps: scenes → labelled grasps, Algorithm 1 of the supplement.
+
+Assumptions: A-1 quasi-static physics with Coulomb friction (pipeline/gripper/limits),
+A-2 airtight, rigid objects (the catalogue's closed meshes), A-3 no object weight and no
+torques about x, y (the wrench of pipeline/gripper/wrench has four rows).
+"""
+
+from collections import Counter
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact
+from pipeline.artifacts.grasp_messages import (
+    GraspOrigin,
+    LabelledGrasps,
+    grasp_batch,
+    grasps_of,
+)
+from pipeline.artifacts.object_messages import read_objects
+from pipeline.artifacts.scene_messages import read_scene, scene_count
+from pipeline.artifacts.sharding import is_current, shard_entry, shard_path, write_index
+from pipeline.clutter.scene import ClutterScene
+from pipeline.config import RunConfig
+from pipeline.errors import SceneError
+from pipeline.execution import (
+    StageContext,
+    Summary,
+    generator,
+    progress,
+    run_in_order,
+    stage_command,
+)
+from pipeline.geometry.catalogue import CatalogueObject
+from pipeline.geometry.mesh import Mesh
+from pipeline.geometry.raycasting import RayScene
+from pipeline.gripper import (
+    LIMIT_NAMES,
+    GraspStatus,
+    Labels,
+    Pad,
+    build_pad,
+    joined_labels,
+    label_batch,
+)
+from pipeline.gripper.balancing import flattened, quality_histogram, rare_grasps
+from pipeline.gripper.sampling import (
+    Candidates,
+    Proposal,
+    VisibleSurface,
+    joined,
+    propose,
+    propose_nearby,
+)
+from pipeline.recording.grasps import ShownGrasp, blueprint, show_grasps
+from pipeline.recording.recording import recording, spread
+from pipeline.sensing.cameras import pixel_rays
+from pipeline.sensing.depth_noise import disturb
+from pipeline.sensing.sub_cloud import sub_clouds
+from pipeline.sensing.view import CameraView
+from schemas.softgrip.v1.grasps_pb2 import GraspBatch
+from stages.graph import GRASPS, inputs_of
+
+TOPIC = "/grasps"
+RECORDED_SCENES = 12
+ROUND = 512  # grasps labelled at once: bounds the memory of their rays
+
+
+@dataclass(frozen=True)
+class ShardJob:
+    """One work item: the grasps of one scene."""
+
+    scene_index: int
+    grasps: int
+    shard: Path
+    objects: Path
+    scenes: Path
+    config: RunConfig
+    provenance: Provenance
+
+
+@dataclass(frozen=True)
+class ShardResult:
+    """What the driver needs to know of a finished shard."""
+
+    shard: Path
+    split: str
+    quality: Float[np.ndarray, " n"]
+    object_names: tuple[str, ...]
+    status: dict[str, int]
+
+
+def build(stage: StageContext) -> Summary:
+    """Synthesize labelled grasps on every scene, one shard a scene."""
+    scenes = stage.upstream("scenes")
+    count = scene_count(scenes)
+    share, more = divmod(stage.config.grasps.count, count)
+    jobs = [
+        ShardJob(
+            scene_index=index,
+            grasps=share + (index < more),
+            shard=shard_path(stage.shards, index, count),
+            objects=stage.upstream("objects"),
+            scenes=scenes,
+            config=stage.config,
+            provenance=stage.provenance(),
+        )
+        for index in range(count)
+    ]
+    done = run_in_order(synthesize_shard, jobs, stage.workers)
+    results = list(progress(done, count, "grasps", "scene"))
+    quality = np.concatenate([result.quality for result in results])
+    record(stage, [result.shard for result in results], quality)
+    entries = [shard_entry(r.shard, stage.output.parent, len(r.quality), r.split) for r in results]
+    write_index(stage.output, stage.provenance(), entries, quality_histogram(quality))
+    return summary(results, quality)
+
+
+def synthesize_shard(job: ShardJob) -> ShardResult:
+    """Make, or keep, the shard of one scene."""
+    if not is_current(job.shard, job.provenance.key):
+        scene = read_scene(job.scenes, job.scene_index)
+        meshes = {name: item.mesh for name, (item, _) in catalogue(job.objects).items()}
+        rng = generator(job.config.seed, "grasps", scene.scene_id)
+        batches = synthesize(scene, meshes, job.config, job.grasps, rng)
+        size = job.config.grasps.samples_per_message
+        with ArtifactWriter(job.shard, job.provenance) as artifact:
+            written = 0
+            for origin, grasps in batches:
+                for start in range(0, len(grasps), size):
+                    part = grasps.rows(start, min(start + size, len(grasps)))
+                    artifact.write(TOPIC, grasp_batch(origin, part), log_time_ns=written)
+                    written += len(part)
+    return examined(job.shard)
+
+
+@lru_cache(maxsize=1)
+def catalogue(objects: Path) -> dict[str, tuple[CatalogueObject, str]]:
+    """The object catalogue, read once a worker."""
+    return read_objects(objects)
+
+
+@lru_cache(maxsize=1)
+def pad_of(config: RunConfig) -> Pad:
+    """S-1.02, S-1.03: the pad in GCS, within Table I's steps, built once a worker."""
+    return build_pad(config.gripper.pad)
+
+
+def synthesize(
+    scene: ClutterScene,
+    meshes: dict[str, Mesh],
+    config: RunConfig,
+    wanted: int,
+    rng: np.random.Generator,
+) -> list[tuple[GraspOrigin, LabelledGrasps]]:
+    """Algorithm 1 on every object of a scene, from each of its viewpoints.
+
+    S-1.01, the object's pose in SE(3), is where physics left it.
+    """
+    placed = scene.objects
+    names = tuple(sorted({item.object_name for item in placed}))
+    rays, body_ids = ray_scene(scene, meshes, config)
+    index_of_body = {item.body_id: names.index(item.object_name) for item in placed}
+    batches = []
+    for number, view in enumerate(scene.views):
+        share = wanted // len(scene.views) + (number < wanted % len(scene.views))
+        grasps = grasps_of_view(view, rays, body_ids, config, share, rng)
+        index = np.array([index_of_body[int(body)] for body in grasps.body_id], dtype=np.int64)
+        origin = GraspOrigin(
+            scene_id=scene.scene_id,
+            viewpoint=view.camera.name,
+            level=scene.level,
+            split=scene.split,
+            object_names=names,
+            limit_names=LIMIT_NAMES,
+            status_names=tuple(status.name.lower() for status in GraspStatus),
+            proposal_names=tuple(proposal.name.lower() for proposal in Proposal),
+        )
+        batches.append((origin, replace(grasps, object_index=index)))
+    return batches
+
+
+def ray_scene(
+    scene: ClutterScene, meshes: dict[str, Mesh], config: RunConfig
+) -> tuple[RayScene, Int[np.ndarray, " bodies"]]:
+    """The true surfaces of a scene, table last, and the body id of each of its bodies."""
+    placed = scene.objects
+    bodies = [meshes[item.object_name].transformed(item.world_from_object) for item in placed]
+    table = table_mesh(config.scenes.table_side_m)
+    return RayScene([*bodies, table]), np.array([*(item.body_id for item in placed), 0])
+
+
+def grasps_of_view(
+    view: CameraView,
+    rays: RayScene,
+    body_ids: np.ndarray,
+    config: RunConfig,
+    wanted: int,
+    rng: np.random.Generator,
+) -> LabelledGrasps:
+    """Propose, label, balance, and cut the sub clouds of what is kept."""
+    surface = visible_surface(view, rays, body_ids)
+    tried = int(np.ceil(wanted * config.grasps.oversampling))
+    candidates, labels = label_rounds(surface, rays, body_ids, config, tried, rng)
+    kept, probability = flattened(labels.quality, wanted, config.grasps.balance, rng)
+    candidates, labels = candidates.take(kept), labels.take(kept)
+    # S-1.13 - S-1.15: the camera's picture, disturbed, transformed, desampled.
+    measured = disturb(view, config.sensing, rng)
+    cloud, mask = sub_clouds(
+        measured,
+        view.camera,
+        candidates.world_from_contact,
+        config.sensing,
+        config.gripper.pad.radius_m,
+    )
+    first_touch = candidates.world_from_contact.copy()
+    first_touch[:, :3, 3] += labels.touch_height_m[:, None] * first_touch[:, :3, 2]
+    return LabelledGrasps(
+        object_index=candidates.body_id,
+        body_id=candidates.body_id,
+        world_from_gripper=first_touch,
+        quality=labels.quality,
+        pressure=labels.pressure,
+        wrench=labels.wrench,
+        limit_slack=labels.slacks,
+        weight_summary=labels.weights,
+        contact_mask=labels.contact,
+        status=labels.status,
+        iterations=labels.iterations,
+        tilt_rad=candidates.tilt_rad,
+        proposal=candidates.proposal,
+        keep_probability=probability,
+        cloud=cloud,
+        cloud_mask=mask,
+        touch_height_m=labels.touch_height_m,
+    )
+
+
+def label_rounds(
+    surface: VisibleSurface,
+    rays: RayScene,
+    body_ids: np.ndarray,
+    config: RunConfig,
+    tried: int,
+    rng: np.random.Generator,
+) -> tuple[Candidates, Labels]:
+    """S-1.04 - S-1.12 in two rounds: over all that is seen, then near what is rare."""
+    pad = pad_of(config)
+    bodies = np.unique(surface.body_id)
+    parts = {int(body): surface.of_body(body) for body in bodies}
+    first = tried - int(tried * config.grasps.nearby_share)
+    candidates = joined(
+        [
+            propose(parts[int(body)], count, config.grasps, rng)
+            for body, count in zip(bodies, spread_evenly(first, len(bodies)), strict=True)
+        ]
+    )
+    labels = label_candidates(candidates, rays, body_ids, pad, config)
+    origins = rare_grasps(labels.quality, tried - first, rng)
+    near = joined(
+        [
+            propose_nearby(
+                parts[int(body)],
+                candidates.take(origins[candidates.body_id[origins] == body]),
+                config.grasps,
+                rng,
+            )
+            for body in bodies
+        ]
+    )
+    near_labels = label_candidates(near, rays, body_ids, pad, config)
+    return joined([candidates, near]), labels.followed_by(near_labels)
+
+
+def label_candidates(
+    candidates: Candidates,
+    rays: RayScene,
+    body_ids: np.ndarray,
+    pad: Pad,
+    config: RunConfig,
+) -> Labels:
+    """S-1.07 - S-1.12 for every candidate: its pad's heights by rays, then the label."""
+    parts = []
+    for start in range(0, len(candidates), ROUND):
+        frames = candidates.world_from_contact[start : start + ROUND]
+        heights, below = pad_heights(frames, rays, pad, config.grasps.clearance_m)
+        on_target = body_ids[below] == candidates.body_id[start : start + ROUND, None]
+        parts.append(label_batch(pad, config.gripper, heights, on_target & (below >= 0)))
+    return joined_labels(parts)
+
+
+def pad_heights(
+    world_from_contact: Float[np.ndarray, "n 4 4"], rays: RayScene, pad: Pad, clearance_m: float
+) -> tuple[Float[np.ndarray, "n v"], Int[np.ndarray, "n v"]]:
+    """z_s(v): height of the scene under each pad vertex above the contact, and what body it is.
+
+    Rays go down the approach from ``clearance_m`` above the contact; -inf and -1 where
+    nothing is hit.
+    """
+    count, vertices = len(world_from_contact), len(pad.vertices_xy_m)
+    above = np.column_stack([pad.vertices_xy_m, np.full(vertices, clearance_m)])
+    rotation = world_from_contact[:, :3, :3]
+    origins = above @ rotation.transpose(0, 2, 1) + world_from_contact[:, None, :3, 3]
+    down = np.repeat(-rotation[:, :, 2], vertices, axis=0)
+    hits = rays.cast(origins.reshape(-1, 3), down)
+    return (
+        (clearance_m - hits.distance_m).reshape(count, vertices),
+        hits.body.reshape(count, vertices),
+    )
+
+
+def visible_surface(view: CameraView, rays: RayScene, body_ids: np.ndarray) -> VisibleSurface:
+    """What the camera sees of the objects: exact points and normals under its pixels."""
+    origin, directions = pixel_rays(view.camera, view.segmentation > 0)
+    hits = rays.cast(np.broadcast_to(origin, directions.shape), directions)
+    body = np.where(hits.body >= 0, body_ids[hits.body], 0)
+    seen = body > 0
+    if not seen.any():
+        raise SceneError(
+            f"Camera {view.camera.name} sees no object",
+            "Change camera.elevations_rad or azimuths_rad",
+        )
+    points = origin + hits.distance_m[seen, None] * directions[seen]
+    return VisibleSurface(points, rays.normals_at(hits)[seen], body[seen])
+
+
+def spread_evenly(total: int, parts: int) -> list[int]:
+    """``total`` in ``parts`` whole numbers that differ by one at most."""
+    return [total // parts + (i < total % parts) for i in range(parts)]
+
+
+def examined(shard: Path) -> ShardResult:
+    """What a finished shard holds, read back from the file itself."""
+    quality, names, split = [], set(), ""
+    status: Counter[str] = Counter()
+    with open_artifact(shard) as artifact:
+        for _, message in artifact.messages(GraspBatch):
+            origin, grasps = grasps_of(message)
+            split = origin.split
+            quality.append(grasps.quality)
+            names |= {origin.object_names[i] for i in np.unique(grasps.object_index)}
+            status.update(origin.status_names[s] for s in grasps.status)
+    return ShardResult(shard, split, np.concatenate(quality), tuple(sorted(names)), dict(status))
+
+
+def record(stage: StageContext, shards: list[Path], quality: np.ndarray) -> None:
+    """The recording: grasps of some scenes, spread over their labels."""
+    chosen = spread(len(shards), RECORDED_SCENES)
+    each = max(1, stage.config.recording.grasps // len(chosen))
+    meshes = {n: item.mesh for n, (item, _) in catalogue(stage.upstream("objects")).items()}
+    shown: list[ShownGrasp] = []
+    for index in chosen:
+        scene = read_scene(stage.upstream("scenes"), index)
+        shown += shown_grasps(scene, shards[index], meshes, stage.config, each)
+    with recording(stage.recording, stage.stage.name, stage.key.digest, blueprint()) as stream:
+        show_grasps(stream, shown, meshes, pad_of(stage.config), quality)
+
+
+def shown_grasps(
+    scene: ClutterScene, shard: Path, meshes: dict[str, Mesh], config: RunConfig, wanted: int
+) -> list[ShownGrasp]:
+    """Some grasps of a scene, from its worst to its best label, with their pads draped again."""
+    with open_artifact(shard) as artifact:
+        batches = [grasps_of(message) for _, message in artifact.messages(GraspBatch)]
+    rows = [(origin, batch, row) for origin, batch in batches for row in range(len(batch))]
+    rows.sort(key=lambda found: found[1].quality[found[2]])
+    rays, _ = ray_scene(scene, meshes, config)
+    pad = pad_of(config)
+    shown = []
+    for origin, grasps, row in (rows[i] for i in spread(len(rows), wanted)):
+        frame = grasps.world_from_gripper[row : row + 1]
+        heights, _ = pad_heights(frame, rays, pad, config.grasps.clearance_m)
+        shown.append(ShownGrasp(scene, origin, grasps, row, drape(pad, heights)[0]))
+    return shown
+
+
+def summary(results: list[ShardResult], quality: np.ndarray) -> Summary:
+    """The stage's headline figures."""
+    status: Counter[str] = Counter()
+    for result in results:
+        status.update(result.status)
+    return {
+        "grasps": len(quality),
+        "quality_histogram": quality_histogram(quality).tolist(),
+        "status": dict(sorted(status.items())),
+        "objects": len({name for result in results for name in result.object_names}),
+        "scenes": len(results),
+    }
+
+
+if __name__ == "__main__":
+    stage_command(GRASPS, build, inputs_of)

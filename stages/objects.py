@@ -1,0 +1,128 @@
+"""Stage 1, objects: meshes in → repaired, rescaled, classed by NSVR, cut into convex parts."""
+
+from collections import Counter
+from functools import partial
+from pathlib import Path
+
+from loguru import logger
+
+from pipeline.artifacts import ArtifactWriter
+from pipeline.artifacts.object_messages import REFUSED_TOPIC, TOPIC, object_message
+from pipeline.config import ObjectsConfig
+from pipeline.errors import MeshError
+from pipeline.execution import (
+    StageContext,
+    Summary,
+    generator,
+    progress,
+    run_in_order,
+    stage_command,
+)
+from pipeline.geometry.catalogue import (
+    CatalogueObject,
+    MeasuredObject,
+    finish_object,
+    measure_object,
+)
+from pipeline.geometry.mesh_files import load_mesh_file, object_names
+from pipeline.geometry.parametric import PARAMETRIC_OBJECTS, parametric_source
+from pipeline.geometry.selection import choose_split, choose_subset
+from pipeline.recording.objects import blueprint, show_catalogue
+from pipeline.recording.recording import recording, spread
+from schemas.softgrip.v1.objects_pb2 import RefusedMesh
+from stages.graph import OBJECTS, inputs_of
+
+
+def build(stage: StageContext) -> Summary:
+    """Turn meshes into the object catalogue: repair, rescale, NSVR, convex parts, split."""
+    config, seed = stage.config.objects, stage.config.seed
+    measured, refused = measure(stage)
+    classes = {item.source.name: item.shape_class for item in measured}
+    if not classes:
+        raise MeshError("Not one mesh could be used", "See the reasons above, or unset MESH_DIR")
+    chosen = choose_subset(classes, config.limit, seed)
+    cache = stage.folder.path.parent / ".cache" / "convex_parts"
+    finish = partial(finished, config=config, seed=seed, cache=cache)
+    todo = [item for item in measured if item.source.name in set(chosen)]
+    results = run_in_order(finish, todo, stage.workers)
+    objects = list(progress(results, len(todo), "objects: convex parts", "object"))
+    split = choose_split(
+        {item.name: item.shape_class for item in objects}, stage.config.split, seed
+    )
+    publish(stage, objects, dict(split), refused)
+    return summary(objects, dict(split), refused)
+
+
+def measure(stage: StageContext) -> tuple[list[MeasuredObject], list[RefusedMesh]]:
+    """Load, repair and measure every source; what is refused is named, the others go on."""
+    paths = [path for name, path in stage.inputs.items() if name.startswith("meshes/")]
+    folder = stage.mesh_dir
+    jobs: list[tuple[Path | None, str]] = [(None, name) for name in sorted(PARAMETRIC_OBJECTS)]
+    if folder is not None:
+        names = object_names(paths, folder)
+        jobs = [(path, names[path]) for path in paths]
+    job = partial(measured_or_refused, config=stage.config.objects, folder=folder)
+    results = run_in_order(job, jobs, stage.workers)
+    measured, refused = [], []
+    for result in progress(results, len(jobs), "objects: repair and NSVR", "mesh"):
+        if isinstance(result, RefusedMesh):
+            logger.warning("left out: {}. {}", result.reason, result.remedy)
+            refused.append(result)
+        else:
+            measured.append(result)
+    return measured, refused
+
+
+def measured_or_refused(
+    job: tuple[Path | None, str], config: ObjectsConfig, folder: Path | None
+) -> MeasuredObject | RefusedMesh:
+    """One source measured, or why it cannot be."""
+    path, name = job
+    try:
+        if path is None or folder is None:
+            return measure_object(parametric_source(name), config)
+        return measure_object(load_mesh_file(path, folder, name, config), config)
+    except MeshError as error:
+        return RefusedMesh(source=name, reason=error.what, remedy=error.remedy)
+
+
+def finished(
+    measured: MeasuredObject, config: ObjectsConfig, seed: int, cache: Path
+) -> CatalogueObject:
+    """Rescale one object and cut it into convex parts."""
+    return finish_object(measured, config, generator(seed, "object", measured.source.name), cache)
+
+
+def publish(
+    stage: StageContext,
+    objects: list[CatalogueObject],
+    split: dict[str, str],
+    refused: list[RefusedMesh],
+) -> None:
+    """Write the recording, then the artifact: what is there last makes the stage whole."""
+    shown = [objects[i] for i in spread(len(objects), stage.config.recording.objects)]
+    with recording(stage.recording, stage.stage.name, stage.key.digest, blueprint()) as stream:
+        show_catalogue(stream, [(item, split[item.name]) for item in shown])
+    with ArtifactWriter(stage.output, stage.provenance()) as artifact:
+        for index, item in enumerate(objects):
+            artifact.write(TOPIC, object_message(item, split[item.name]), log_time_ns=index)
+        for index, message in enumerate(refused):
+            artifact.write(REFUSED_TOPIC, message, log_time_ns=index)
+
+
+def summary(
+    objects: list[CatalogueObject], split: dict[str, str], refused: list[RefusedMesh]
+) -> Summary:
+    """The stage's headline figures."""
+    return {
+        "objects": len(objects),
+        "by_class": dict(sorted(Counter(str(item.shape_class) for item in objects).items())),
+        "by_split": dict(sorted(Counter(split.values()).items())),
+        "repaired": sum(bool(item.repairs) for item in objects),
+        "nsvr": {item.name: round(item.nsvr, 6) for item in objects},
+        "left_out": [{"source": r.source, "reason": r.reason, "remedy": r.remedy} for r in refused],
+    }
+
+
+if __name__ == "__main__":
+    stage_command(OBJECTS, build, inputs_of)

@@ -1,0 +1,158 @@
+"""Stage 2, scenes: objects → clutter of the nine levels, settled and rendered in SAPIEN."""
+
+import shutil
+from collections import Counter
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from loguru import logger
+
+from pipeline.artifacts import ArtifactWriter, Provenance
+from pipeline.artifacts.object_messages import read_objects
+from pipeline.artifacts.scene_messages import read_scene, write_scene
+from pipeline.artifacts.sharding import is_current
+from pipeline.clutter.building import build_clutter
+from pipeline.clutter.levels import level_of
+from pipeline.clutter.scene import ClutterScene
+from pipeline.config import RunConfig
+from pipeline.errors import SceneError
+from pipeline.execution import (
+    StageContext,
+    Summary,
+    derive_seed,
+    progress,
+    run_in_order,
+    stage_command,
+)
+from pipeline.geometry.catalogue import CatalogueObject
+from pipeline.recording.recording import recording, spread
+from pipeline.recording.scenes import blueprint, show_scene
+from pipeline.sensing.cameras import cameras_of
+from pipeline.sensing.rendering import SceneRenderer, new_renderer
+from stages.graph import SCENES, inputs_of
+
+
+@dataclass(frozen=True)
+class SceneJob:
+    """One work item: one clutter of one level, of one split's objects."""
+
+    scene_id: str
+    level: int
+    split: str
+    path: Path
+    objects: Path
+    config: RunConfig
+    provenance: Provenance
+
+
+def build(stage: StageContext) -> Summary:
+    """Build, settle and render clutter scenes of every level, from each split's objects."""
+    jobs = scene_jobs(stage)
+    done = run_in_order(make_scene, jobs, stage.workers)
+    parts = list(progress(done, len(jobs), "scenes: settle and render", "scene"))
+    publish(stage, parts)
+    scenes = [read_scene(stage.output, index) for index in range(len(parts))]
+    shutil.rmtree(stage.folder.state("scenes"))
+    return summary(scenes)
+
+
+def scene_jobs(stage: StageContext) -> list[SceneJob]:
+    """Every clutter of the run, level by level."""
+    counts = stage.config.scenes.clutters_per_level
+    jobs = []
+    for level in sorted(stage.config.scenes.levels):
+        for split, count in (("train", counts.train), ("val", counts.val), ("test", counts.test)):
+            for number in range(count):
+                scene_id = f"level{level}-{split}-{number:02d}"
+                path = stage.folder.state("scenes") / f"{scene_id}.mcap"
+                jobs.append(
+                    SceneJob(
+                        scene_id,
+                        level,
+                        split,
+                        path,
+                        stage.upstream("objects"),
+                        stage.config,
+                        stage.provenance(),
+                    )
+                )
+    return jobs
+
+
+def make_scene(job: SceneJob) -> Path:
+    """Make, or keep, one scene: its own file until all are there."""
+    if is_current(job.path, job.provenance.key):
+        return job.path
+    shape_class, _ = level_of(job.level)
+    pool = [
+        item
+        for item, split in catalogue(job.objects).values()
+        if split == job.split and item.shape_class == shape_class
+    ]
+    if not pool:
+        raise SceneError(
+            f"Level {job.level} needs {shape_class} objects of the {job.split} split, "
+            f"and {job.objects} has none",
+            "Add meshes, raise objects.limit, or leave the level out of scenes.levels",
+        )
+    seed = derive_seed(job.config.seed, "scene", job.scene_id)
+    scene = build_clutter(job.scene_id, job.level, job.split, pool, job.config.scenes, seed)
+    objects = {item.name: item for item in pool}
+    renderer = renderer_of(job.config)
+    seen = renderer.rendered(scene, objects)
+    with ArtifactWriter(job.path, job.provenance) as artifact:
+        write_scene(artifact, 0, seen, renderer.name)
+    return job.path
+
+
+@lru_cache(maxsize=1)
+def catalogue(objects: Path) -> dict[str, tuple[CatalogueObject, str]]:
+    """The object catalogue, read once a worker."""
+    return read_objects(objects)
+
+
+@lru_cache(maxsize=1)
+def renderer_of(config: RunConfig) -> SceneRenderer:
+    """The renderer of this worker; its first frame costs seconds, so it is kept."""
+    return new_renderer(config.scenes, cameras_of(config.camera))
+
+
+def publish(stage: StageContext, parts: list[Path]) -> None:
+    """One recording and one artifact of all scenes, in order."""
+    meshes = {n: item.mesh for n, (item, _) in catalogue(stage.upstream("objects")).items()}
+    nsvr = {n: item.nsvr for n, (item, _) in catalogue(stage.upstream("objects")).items()}
+    with recording(stage.recording, stage.stage.name, stage.key.digest, blueprint()) as stream:
+        for step, index in enumerate(spread(len(parts), stage.config.recording.scenes)):
+            show_scene(stream, step, read_scene(parts[index], 0), meshes, nsvr)
+    name = renderer_of(stage.config).name
+    logger.debug("scenes: rendered with {}", name)
+    with ArtifactWriter(stage.output, stage.provenance()) as artifact:
+        for index, part in enumerate(parts):
+            write_scene(artifact, index, read_scene(part, 0), name)
+
+
+def summary(scenes: list[ClutterScene]) -> Summary:
+    """The stage's headline figures."""
+    gaps = {
+        str(level): [
+            round(1e3 * float(gap), 3)
+            for scene in scenes
+            if scene.level == level
+            for gap in scene.gaps_m
+        ]
+        for level in sorted({scene.level for scene in scenes})
+    }
+    return {
+        "scenes": len(scenes),
+        "by_split": dict(Counter(scene.split for scene in scenes)),
+        "objects_placed": sum(len(scene.objects) for scene in scenes),
+        "settle_time_s": round(sum(scene.settle_time_s for scene in scenes), 3),
+        "gap_mm_by_level": {
+            level: {"least": min(found), "greatest": max(found)} for level, found in gaps.items()
+        },
+    }
+
+
+if __name__ == "__main__":
+    stage_command(SCENES, build, inputs_of)

@@ -1,0 +1,132 @@
+"""Grasps and samples survive their messages; shards are named, kept and checked."""
+
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.artifacts import ArtifactWriter, Provenance
+from pipeline.artifacts.grasp_messages import GraspOrigin, LabelledGrasps, grasp_batch, grasps_of
+from pipeline.artifacts.sample_messages import Samples, joined_samples, sample_batch, samples_of
+from pipeline.artifacts.sharding import (
+    is_current,
+    listed_shards,
+    read_index,
+    shard_entry,
+    shard_path,
+    write_index,
+)
+from pipeline.errors import ArtifactError
+from schemas.softgrip.v1.grasps_pb2 import GraspBatch, ShardEntry
+from schemas.softgrip.v1.samples_pb2 import SampleBatch
+
+
+def some_grasps(count: int, vertices: int = 586) -> LabelledGrasps:
+    rng = np.random.default_rng(count)
+    return LabelledGrasps(
+        object_index=rng.integers(0, 3, count),
+        body_id=rng.integers(1, 9, count),
+        world_from_gripper=rng.normal(size=(count, 4, 4)),
+        quality=rng.random(count),
+        pressure=rng.random(count),
+        wrench=rng.normal(size=(count, 4)),
+        limit_slack=rng.random((count, 8)),
+        weight_summary=rng.random((count, 3)),
+        contact_mask=rng.random((count, vertices)) < 0.5,
+        status=rng.integers(0, 4, count).astype(np.uint8),
+        iterations=rng.integers(0, 100, count),
+        tilt_rad=rng.random(count),
+        proposal=rng.integers(0, 3, count),
+        keep_probability=rng.random(count),
+        cloud=rng.normal(size=(count, 24, 24, 3)).astype(np.float16),
+        cloud_mask=rng.random((count, 24, 24)) < 0.5,
+        touch_height_m=rng.random(count),
+    )
+
+
+ORIGIN = GraspOrigin("s1", "static", 3, "train", ("a", "b", "c"), ("Fx",), ("solved",), ("n",))
+
+
+@pytest.mark.parametrize("count", [0, 1, 7])
+def test_grasps_round_trip(count: int) -> None:
+    grasps = some_grasps(count)
+    wire = grasp_batch(ORIGIN, grasps).SerializeToString()
+    origin, back = grasps_of(GraspBatch.FromString(wire))
+    assert origin == ORIGIN
+    for field in fields(grasps):
+        then, now = getattr(grasps, field.name), getattr(back, field.name)
+        narrow = field.name in ("tilt_rad", "keep_probability")
+        np.testing.assert_allclose(now, then, rtol=1e-6 if narrow else 0)
+
+
+def test_samples_round_trip_and_join() -> None:
+    rng = np.random.default_rng(0)
+    samples = Samples(
+        cloud=rng.normal(size=(9, 24, 24, 3)).astype(np.float16),
+        cloud_mask=rng.random((9, 24, 24)) < 0.5,
+        quality=rng.random(9).astype(np.float32),
+        object_index=rng.integers(0, 5, 9),
+        shape_class=rng.integers(0, 3, 9),
+        level=rng.integers(1, 10, 9),
+        pressure=rng.random(9).astype(np.float32),
+    )
+    parts = [samples.take(slice(0, 4)), samples.take(slice(4, 9))]
+    wired = [
+        samples_of(SampleBatch.FromString(sample_batch(p, ("a",)).SerializeToString()))
+        for p in parts
+    ]
+    back = joined_samples(wired)
+    for field in fields(samples):
+        np.testing.assert_array_equal(getattr(back, field.name), getattr(samples, field.name))
+
+
+def make_shards(folder: Path, provenance: Provenance) -> tuple[Path, list[ShardEntry]]:
+    index = folder / "grasps.mcap"
+    entries = []
+    for i, split in enumerate(("train", "test")):
+        path = shard_path(folder / "grasps", i, 2)
+        with ArtifactWriter(path, provenance) as artifact:
+            artifact.write("/grasps", grasp_batch(ORIGIN, some_grasps(2)), log_time_ns=0)
+        entries.append(shard_entry(path, folder, 2, split))
+    write_index(index, provenance, entries, np.arange(10))
+    return index, entries
+
+
+def test_index_names_its_shards_by_split(tmp_path: Path, provenance: Provenance) -> None:
+    index, _ = make_shards(tmp_path, provenance)
+    assert [p.name for p in listed_shards(index)] == ["00000-of-00002.mcap", "00001-of-00002.mcap"]
+    assert [p.name for p in listed_shards(index, ["test"])] == ["00001-of-00002.mcap"]
+    assert read_index(index).samples == 4
+
+
+def test_publishing_an_index_clears_strays(tmp_path: Path, provenance: Provenance) -> None:
+    index, entries = make_shards(tmp_path, provenance)
+    stray = shard_path(tmp_path / "grasps", 2, 3)
+    stray.write_bytes(b"old")
+    write_index(index, provenance, entries, np.arange(10))
+    assert not stray.exists()
+
+
+def test_a_missing_shard_is_named(tmp_path: Path, provenance: Provenance) -> None:
+    index, _ = make_shards(tmp_path, provenance)
+    shard_path(tmp_path / "grasps", 1, 2).unlink()
+    with pytest.raises(ArtifactError, match=r"00001-of-00002\.mcap is missing"):
+        listed_shards(index)
+
+
+def test_an_index_cannot_lead_out_of_its_folder(tmp_path: Path, provenance: Provenance) -> None:
+    index = tmp_path / "run" / "grasps.mcap"
+    outside = [ShardEntry(path="../secret.mcap", samples=1, split="train")]
+    write_index(index, provenance, outside, np.arange(10))
+    with pytest.raises(ArtifactError, match="leads out of its folder"):
+        listed_shards(index)
+
+
+def test_only_whole_shards_of_this_key_are_current(tmp_path: Path, provenance: Provenance) -> None:
+    make_shards(tmp_path, provenance)
+    path = shard_path(tmp_path / "grasps", 0, 2)
+    assert is_current(path, provenance.key)
+    assert not is_current(path, "another")
+    path.write_bytes(path.read_bytes()[:-200])
+    assert not is_current(path, provenance.key)
