@@ -78,7 +78,7 @@ def stage_context(
                 f"Make {name} first: 'make {stage.name} RUN={folder.path.name}' does both",
             )
     key = stage_key(config, stage.sections, stage.module, inputs, folder.state("hashes.json"))
-    return StageContext(stage, config, folder, key, inputs, workers)
+    return StageContext(stage, config, folder, key, inputs, workers, mesh_dir)
 
 
 def is_fresh(context: StageContext) -> bool:

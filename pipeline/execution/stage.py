@@ -74,6 +74,7 @@ class StageContext:
     key: Key
     inputs: dict[str, Path]
     workers: int
+    mesh_dir: Path | None
 
     @property
     def output(self) -> Path:

@@ -1,0 +1,53 @@
+"""The baselines do what their names say on clouds whose answer is known."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from pipeline.network.baselines import fit_monotone, mean_predictor_mae, seal_ratio
+from pipeline.network.figures import mean_absolute_error
+from tests.network.planes import SEAL_RADIUS, grid_xy, planes_with_holes
+
+TOLERANCE = 0.04
+
+
+def test_mean_predictor_by_hand() -> None:
+    train = np.array([0.0, 1.0], dtype=np.float32)
+    test = np.array([0.0, 0.5, 1.0], dtype=np.float32)
+    assert mean_predictor_mae(train, test) == pytest.approx(1 / 3)
+
+
+def test_full_tilted_plane_seals_and_half_a_plane_half() -> None:
+    x, y = grid_xy()
+    cloud = np.stack((x, y, 0.3 * x - 0.1 * y + 0.2), axis=-1)[None].repeat(3, axis=0)
+    mask = np.ones(cloud.shape[:3], dtype=np.bool_)
+    mask[1, :, :12] = False
+    cloud[2, :, 18:, 2] -= 1.0  # a step that leaves x < 0.6: the plane stays that of the rest
+    ratios = seal_ratio(cloud, mask, SEAL_RADIUS, TOLERANCE)
+    share = (x[np.hypot(x, y) <= SEAL_RADIUS] < 0.6).mean()
+    assert ratios == pytest.approx([1.0, 0.5, share])
+
+
+def test_nothing_seen_is_no_seal() -> None:
+    cloud = np.zeros((1, 24, 24, 3))
+    assert seal_ratio(cloud, np.zeros((1, 24, 24), dtype=np.bool_), 0.8, TOLERANCE) == [0.0]
+
+
+def test_seal_ratio_regressor_beats_the_mean_on_planes_with_holes() -> None:
+    train, test = planes_with_holes(300, seed=0), planes_with_holes(300, seed=1)
+    regressor = fit_monotone(
+        seal_ratio(train.cloud, train.mask, SEAL_RADIUS, TOLERANCE), train.quality
+    )
+    predicted = regressor.predict(seal_ratio(test.cloud, test.mask, SEAL_RADIUS, TOLERANCE))
+    mae = mean_absolute_error(predicted, test.quality)
+    assert mae < 0.5 * mean_predictor_mae(train.quality, test.quality)
+
+
+@given(arrays(np.float64, (2, 20), elements=st.floats(0, 1)))
+def test_monotone_regressor_rises_and_keeps_the_mean(pair: np.ndarray) -> None:
+    feature, quality = pair
+    regressor = fit_monotone(feature, quality)
+    assert bool(np.all(np.diff(regressor.quality) >= -1e-12))
+    assert regressor.predict(feature).mean() == pytest.approx(quality.mean())

@@ -1,0 +1,140 @@
+"""A network learns what it can, repeats itself to the bit, and survives a kill."""
+
+import itertools
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.config.learning import NetworkConfig, TrainConfig
+from pipeline.errors import ArtifactError
+from pipeline.network.baselines import mean_predictor_mae
+from pipeline.network.checkpoint import save_checkpoint_bytes
+from pipeline.network.figures import mean_absolute_error
+from pipeline.network.inference import predict
+from pipeline.network.samples import GraspTensors
+from pipeline.network.training import (
+    STATE_FILE,
+    EpochMetrics,
+    TrainedNetwork,
+    learning_rate_at,
+    train,
+)
+from tests.network.planes import planes_with_holes
+
+NETWORK = NetworkConfig(layers=18, channels=(16, 16, 32, 32))
+SHORT = TrainConfig(epochs=3, batch_size=32, threads=1, device="cpu")
+
+
+@pytest.fixture(scope="module")
+def few() -> GraspTensors:
+    return planes_with_holes(100, seed=0)
+
+
+@pytest.fixture(scope="module")
+def held_out() -> GraspTensors:
+    return planes_with_holes(200, seed=1)
+
+
+class KilledError(Exception):
+    """Stands for a process that ends between two epochs."""
+
+
+def short_training(
+    few: GraspTensors, state_dir: Path, seed: int, kill_after: int | None
+) -> TrainedNetwork:
+    def on_epoch(metrics: EpochMetrics) -> None:
+        if metrics.epoch == kill_after:
+            raise KilledError
+
+    return train(SHORT, NETWORK, seed, few, few, state_dir, on_epoch)
+
+
+def test_learns_planes_with_holes_far_better_than_the_mean(
+    tmp_path: Path, held_out: GraspTensors
+) -> None:
+    training = planes_with_holes(1500, seed=2)
+    config = TrainConfig(epochs=8, batch_size=64, learning_rate=4e-3, threads=1, device="cpu")
+    seen: list[int] = []
+    trained = train(
+        config, NETWORK, 0, training, held_out, tmp_path, lambda metrics: seen.append(metrics.epoch)
+    )
+    predicted = predict(trained.network, held_out.cloud, held_out.mask, 64, 1, False)
+    mae = mean_absolute_error(predicted, held_out.quality)
+    assert mae < 0.4 * mean_predictor_mae(training.quality, held_out.quality)
+    assert mae == pytest.approx(trained.val_mae, abs=1e-6)
+    assert seen == list(range(8))
+    averaged = predict(trained.network, held_out.cloud, held_out.mask, 64, 1, True)
+    assert mean_absolute_error(averaged, held_out.quality) < 1.1 * mae
+
+
+def test_equal_runs_give_equal_bytes_and_another_seed_does_not(
+    tmp_path: Path, few: GraspTensors
+) -> None:
+    first = short_training(few, tmp_path / "a", seed=1, kill_after=None)
+    second = short_training(few, tmp_path / "b", seed=1, kill_after=None)
+    other = short_training(few, tmp_path / "c", seed=2, kill_after=None)
+    assert save_checkpoint_bytes(first.network) == save_checkpoint_bytes(second.network)
+    assert save_checkpoint_bytes(first.network) != save_checkpoint_bytes(other.network)
+    assert first.history == second.history
+    states = [(tmp_path / run / STATE_FILE).read_bytes() for run in "ab"]
+    assert states[0] == states[1]
+
+
+@pytest.mark.parametrize("kill_after", [0, 1])
+def test_killed_run_resumes_to_the_same_bytes(
+    tmp_path: Path, few: GraspTensors, kill_after: int
+) -> None:
+    whole = short_training(few, tmp_path / "whole", seed=1, kill_after=None)
+    with pytest.raises(KilledError):
+        short_training(few, tmp_path / "killed", seed=1, kill_after=kill_after)
+    resumed = short_training(few, tmp_path / "killed", seed=1, kill_after=None)
+    assert resumed.history == whole.history
+    assert save_checkpoint_bytes(resumed.network) == save_checkpoint_bytes(whole.network)
+
+
+def test_state_of_other_arguments_is_not_continued(tmp_path: Path, few: GraspTensors) -> None:
+    fresh = short_training(few, tmp_path / "fresh", seed=2, kill_after=None)
+    with pytest.raises(KilledError):
+        short_training(few, tmp_path / "used", seed=1, kill_after=1)
+    again = short_training(few, tmp_path / "used", seed=2, kill_after=None)
+    assert again.history == fresh.history
+
+
+def test_damaged_state_is_named(tmp_path: Path, few: GraspTensors) -> None:
+    with pytest.raises(KilledError):
+        short_training(few, tmp_path, seed=1, kill_after=0)
+    state = tmp_path / STATE_FILE
+    state.write_bytes(state.read_bytes()[:-10])
+    with pytest.raises(ArtifactError, match=STATE_FILE):
+        short_training(few, tmp_path, seed=1, kill_after=None)
+
+
+def test_stops_when_patience_runs_out_and_keeps_the_best(
+    tmp_path: Path, few: GraspTensors, held_out: GraspTensors
+) -> None:
+    # Labels dealt at random hold nothing to learn that holds elsewhere.
+    shuffled = np.random.default_rng(0).permutation(few.quality)
+    noise = GraspTensors(cloud=few.cloud, mask=few.mask, quality=shuffled)
+    config = TrainConfig(
+        epochs=40, batch_size=32, learning_rate=1e-2, patience_epochs=2, threads=1, device="cpu"
+    )
+    trained = train(config, NETWORK, 0, noise, held_out, tmp_path, lambda _: None)
+    assert trained.stopped_early
+    assert len(trained.history) == trained.best_epoch + 1 + config.patience_epochs
+    assert trained.val_mae == min(metrics.val_mae for metrics in trained.history)
+    predicted = predict(trained.network, held_out.cloud, held_out.mask, 32, 1, False)
+    assert mean_absolute_error(predicted, held_out.quality) == pytest.approx(
+        trained.val_mae, abs=1e-6
+    )
+
+
+def test_learning_rate_rises_then_falls_and_never_is_zero() -> None:
+    config = TrainConfig(learning_rate=1.0, warmup_fraction=0.2)
+    rates = [learning_rate_at(step, 100, config) for step in range(100)]
+    assert rates[:20] == pytest.approx([(step + 1) / 20 for step in range(20)])
+    assert max(rates) == 1.0
+    assert all(late < early for early, late in itertools.pairwise(rates[20:]))
+    assert rates[60] == pytest.approx(0.5 * (1 + math.cos(math.pi * 0.5)))
+    assert min(rates) > 0
