@@ -11,9 +11,13 @@ class ConvexPartsConfig(Section):
     """Convex decomposition (CoACD) for collision shapes."""
 
     concavity: float = Field(0.08, ge=0.01, le=1.0, description="CoACD concavity threshold [1]")
-    max_parts: int = Field(24, ge=1, le=256, description="most convex parts an object may have")
-    search_iterations: int = Field(60, ge=10, le=500, description="CoACD tree-search iterations")
-    resolution: int = Field(1000, ge=200, le=10000, description="CoACD sampling resolution")
+    max_parts: int = Field(16, ge=1, le=256, description="most convex parts an object may have")
+    search_iterations: int = Field(20, ge=10, le=500, description="CoACD tree-search iterations")
+    search_nodes: int = Field(10, ge=2, le=50, description="CoACD tree-search nodes a level")
+    preprocess_resolution: int = Field(
+        30, ge=20, le=100, description="CoACD remeshing grid, where it must remesh"
+    )
+    resolution: int = Field(500, ge=200, le=10000, description="CoACD sampling resolution")
     input_faces: int = Field(
         2000, ge=100, le=200_000, description="faces the mesh is decimated to before decomposition"
     )

@@ -26,6 +26,13 @@ class ScenesConfig(Section):
     isolated_gap_min_m: float = Field(0.05, gt=0, description="Supplement V: 5 cm [m]")
     multiple_gap_max_m: float = Field(0.01, gt=0, description="Supplement V: 1 cm [m]")
     placement_attempts: int = Field(60, ge=1, description="tries at one clutter before giving up")
+    workspace_side_m: float = Field(
+        0.85, gt=0.1, le=5, description="side of the square that objects are placed in [m]"
+    )
+    touch_gap_max_m: float = Field(
+        0.002, gt=0, description="stacked objects this near touch, on the true meshes [m]"
+    )
+    sink_max_m: float = Field(0.001, gt=0, description="deepest allowed interpenetration [m]")
     table_side_m: float = Field(1.2, gt=0.2, le=5, description="side of the square table [m]")
     friction: float = Field(0.5, ge=0, le=2, description="object-object and object-table; mu [1]")
     timestep_s: float = Field(1 / 240, gt=0, le=0.02, description="physics step [s]")
@@ -39,6 +46,8 @@ class ScenesConfig(Section):
         unknown = [level for level in self.levels if not 1 <= level <= 9]
         if unknown:
             raise ValueError(f"levels go from 1 to 9 (Table II), got {unknown}")
+        if self.workspace_side_m > self.table_side_m:
+            raise ValueError("workspace_side_m must not exceed table_side_m")
         return self
 
 
@@ -48,7 +57,7 @@ class CameraConfig(Section):
     width_px: int = Field(512, ge=16, le=4096, description="Kinect v2 depth image: 512")
     height_px: int = Field(424, ge=16, le=4096, description="Kinect v2 depth image: 424")
     vertical_fov_rad: float = Field(1.0472, gt=0.05, lt=2.8, description="Kinect v2: 60 deg [rad]")
-    distance_m: float = Field(0.75, gt=0.05, description="from the clutter's centre [m]")
+    distance_m: float = Field(0.90, gt=0.05, description="from the clutter's centre [m]")
     elevations_rad: tuple[float, ...] = Field(
         (1.30,), min_length=1, description="angle above the table, one a viewpoint [rad]"
     )

@@ -30,7 +30,7 @@ def lively(network: GaCnn) -> GaCnn:
     with torch.no_grad():
         network.train()(inputs)
         for parameter in network.head.parameters():
-            parameter *= 3.0
+            parameter.mul_(3.0)
     return network.eval()
 
 

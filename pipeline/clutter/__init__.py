@@ -1,0 +1,1 @@
+"""Clutter scenes of the nine levels: placement, settling, measured gaps."""

@@ -1,0 +1,203 @@
+"""A clutter of a level: built, settled, measured, and refused unless it meets its definition."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from pipeline.clutter.dropping import drop_again, pile, resting_pose
+from pipeline.clutter.gaps import Surface, pairwise_gaps_m, penetration_m
+from pipeline.clutter.levels import Distribution, level_of
+from pipeline.clutter.placement import place_isolated, place_multiple
+from pipeline.clutter.scene import ClutterScene, PlacedObject
+from pipeline.clutter.settling import fallen_off, settle
+from pipeline.config.scenes import ScenesConfig
+from pipeline.errors import SceneError
+from pipeline.geometry.catalogue import CatalogueObject
+from pipeline.simulation.engine import add_body, new_world
+
+_DROPS_AGAIN = 25
+_COLOUR = (0.5, 0.5, 0.5)  # physics has no eyes
+
+
+def build_clutter(
+    scene_id: str,
+    level: int,
+    split: str,
+    pool: Sequence[CatalogueObject],
+    config: ScenesConfig,
+    seed: int,
+) -> ClutterScene:
+    """A clutter of ``objects_per_clutter`` objects from ``pool``, without views yet.
+
+    Each object is drawn as often as any other, give or take one. A clutter that misses its
+    level's definition is drawn again, at most ``placement_attempts`` times.
+
+    Raises
+    ------
+    SceneError : no attempt met the definition; the last reason is in the message.
+    """
+    _, distribution = level_of(level)
+    rng = np.random.Generator(np.random.PCG64(seed))
+    reason = "none was tried"
+    for _ in range(config.placement_attempts):
+        items = drawn(pool, config.objects_per_clutter, rng)
+        try:
+            if distribution is Distribution.STACKED:
+                poses, settle_time_s = _stacked(items, config, rng)
+            else:
+                poses, settle_time_s = _standing(items, distribution, config, rng)
+            gaps = measured(items, poses, distribution, config)
+        except SceneError as error:
+            reason = error.what
+            continue
+        return ClutterScene(
+            scene_id=scene_id,
+            level=level,
+            split=split,
+            seed=seed,
+            objects=tuple(
+                PlacedObject(item.name, body_id, pose)
+                for body_id, (item, pose) in enumerate(zip(items, poses, strict=True), start=1)
+            ),
+            gaps_m=gaps.min(axis=1),
+            contacts=tuple(
+                (int(i) + 1, int(j) + 1)
+                for i, j in np.argwhere(np.triu(gaps <= config.touch_gap_max_m, k=1))
+            ),
+            settle_time_s=settle_time_s,
+            views=(),
+        )
+    raise SceneError(
+        f"{scene_id}: no clutter of level {level} in {config.placement_attempts} attempts ({reason})",
+        "Raise scenes.placement_attempts, or lower scenes.objects_per_clutter",
+    )
+
+
+def drawn(
+    pool: Sequence[CatalogueObject], count: int, rng: np.random.Generator
+) -> list[CatalogueObject]:
+    """``count`` objects in random order, with as few repeats as the pool allows."""
+    rounds = [rng.permutation(len(pool)) for _ in range(-(-count // len(pool)))]
+    return [pool[int(i)] for i in np.concatenate(rounds)[:count]]
+
+
+def measured(
+    items: Sequence[CatalogueObject],
+    poses: Sequence[Float[np.ndarray, "4 4"]],
+    distribution: Distribution,
+    config: ScenesConfig,
+) -> Float[np.ndarray, "n n"]:
+    """The gap of every pair on the true meshes, after holding the level's definition to it.
+
+    Raises
+    ------
+    SceneError : a gap misses the level, or a body sinks, floats or intersects another.
+    """
+    needed = {
+        Distribution.ISOLATED: config.isolated_gap_min_m,
+        Distribution.MULTIPLE: config.multiple_gap_max_m,
+        Distribution.STACKED: config.touch_gap_max_m,
+    }[distribution]
+    surfaces = [Surface(item.mesh) for item in items]
+    gaps = pairwise_gaps_m(surfaces, poses, beyond_m=2 * needed)
+    _check_table(items, poses, distribution, config)
+    _check_overlap(items, poses, gaps, config)
+    if len(items) > 1:
+        _check_level(gaps.min(axis=1), distribution, config)
+    return gaps
+
+
+def _standing(
+    items: Sequence[CatalogueObject],
+    distribution: Distribution,
+    config: ScenesConfig,
+    rng: np.random.Generator,
+) -> tuple[list[Float[np.ndarray, "4 4"]], float]:
+    """SE(2): each object at rest alone, placed, then all settled together."""
+    surfaces = [Surface(item.mesh) for item in items]
+    resting = [resting_pose(item, config, rng) for item in items]
+    place = place_isolated if distribution is Distribution.ISOLATED else place_multiple
+    poses = place(surfaces, resting, config, rng)
+    world = new_world(config, render=False)
+    bodies = [
+        add_body(world, item, pose, body_id, _COLOUR, config)
+        for body_id, (item, pose) in enumerate(zip(items, poses, strict=True), start=1)
+    ]
+    settle_time_s = settle(world, bodies, config)
+    return [body.world_from_object for body in bodies], settle_time_s
+
+
+def _stacked(
+    items: Sequence[CatalogueObject], config: ScenesConfig, rng: np.random.Generator
+) -> tuple[list[Float[np.ndarray, "4 4"]], float]:
+    """SE(3): a pile; what lies apart from it is dropped onto it again."""
+    world, bodies, settle_time_s = pile(items, config, rng)
+    surfaces = [Surface(item.mesh) for item in items]
+    for _ in range(_DROPS_AGAIN):
+        poses = [body.world_from_object for body in bodies]
+        gaps = pairwise_gaps_m(surfaces, poses, beyond_m=2 * config.touch_gap_max_m)
+        off = [body.body_id - 1 for body in fallen_off(bodies, config)]
+        apart = off or np.flatnonzero(gaps.min(axis=1) > config.touch_gap_max_m).tolist()
+        if not apart or len(items) == 1:
+            return poses, settle_time_s
+        settle_time_s += drop_again(world, bodies, items, int(apart[0]), config, rng)
+    raise SceneError(
+        f"After {_DROPS_AGAIN} more drops an object still touched no other",
+        "Draw another seed, or raise scenes.touch_gap_max_m",
+    )
+
+
+def _check_table(
+    items: Sequence[CatalogueObject],
+    poses: Sequence[Float[np.ndarray, "4 4"]],
+    distribution: Distribution,
+    config: ScenesConfig,
+) -> None:
+    for item, pose in zip(items, poses, strict=True):
+        vertices = item.mesh.transformed(pose).vertices_m
+        lowest = float(vertices[:, 2].min())
+        if lowest < -config.sink_max_m:
+            raise SceneError(
+                f"{item.name} sinks {-1e3 * lowest:.2f} mm into the table", "Draw another seed"
+            )
+        if distribution is not Distribution.STACKED and lowest > config.touch_gap_max_m:
+            raise SceneError(f"{item.name} floats {1e3 * lowest:.2f} mm up", "Draw another seed")
+        if np.abs(vertices[:, :2]).max() > config.table_side_m / 2:
+            raise SceneError(f"{item.name} reaches over the table's edge", "Draw another seed")
+
+
+def _check_overlap(
+    items: Sequence[CatalogueObject],
+    poses: Sequence[Float[np.ndarray, "4 4"]],
+    gaps: Float[np.ndarray, "n n"],
+    config: ScenesConfig,
+) -> None:
+    for i, j in np.argwhere(np.triu(gaps <= 0.0, k=1)):
+        depth = penetration_m(
+            items[i].mesh.transformed(poses[i]), items[j].mesh.transformed(poses[j])
+        )
+        if depth > config.sink_max_m:
+            raise SceneError(
+                f"{items[i].name} and {items[j].name} intersect by {1e3 * depth:.2f} mm",
+                "Draw another seed",
+            )
+
+
+def _check_level(
+    nearest_m: Float[np.ndarray, " n"], distribution: Distribution, config: ScenesConfig
+) -> None:
+    least, greatest = float(nearest_m.min()), float(nearest_m.max())
+    if distribution is Distribution.ISOLATED and least < config.isolated_gap_min_m:
+        raise SceneError(f"Isolated objects came within {1e3 * least:.1f} mm", "Draw another seed")
+    if distribution is Distribution.MULTIPLE and (
+        greatest > config.multiple_gap_max_m or least <= 0.0
+    ):
+        raise SceneError(
+            f"Neighbours lie {1e3 * least:.1f} to {1e3 * greatest:.1f} mm apart",
+            "Draw another seed",
+        )
+    if distribution is Distribution.STACKED and greatest > config.touch_gap_max_m:
+        raise SceneError(
+            f"A stacked object lies {1e3 * greatest:.1f} mm from all others", "Draw another seed"
+        )

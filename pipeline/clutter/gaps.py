@@ -1,0 +1,113 @@
+"""Gaps, contacts and interpenetration between true meshes, measured with FCL."""
+
+from collections.abc import Sequence
+
+import fcl
+import numpy as np
+import trimesh
+from jaxtyping import Float
+
+from pipeline.geometry.mesh import Mesh
+from pipeline.geometry.raycasting import RayScene
+
+NO_NEIGHBOUR_M = np.inf
+
+
+class Surface:
+    """A mesh prepared for distance queries at any pose."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        self.mesh = mesh
+        model = fcl.BVHModel()
+        model.beginModel(len(mesh.vertices_m), len(mesh.faces))
+        model.addSubModel(mesh.vertices_m, mesh.faces)
+        model.endModel()
+        self._collision = fcl.CollisionObject(model)
+
+    def at(self, world_from_object: Float[np.ndarray, "4 4"]) -> fcl.CollisionObject:
+        """FCL's object, moved there. One pose at a time: the next call moves it on."""
+        self._collision.setTransform(
+            fcl.Transform(world_from_object[:3, :3].copy(), world_from_object[:3, 3].copy())
+        )
+        return self._collision
+
+
+def gap_m(
+    first: Surface,
+    world_from_first: Float[np.ndarray, "4 4"],
+    second: Surface,
+    world_from_second: Float[np.ndarray, "4 4"],
+) -> float:
+    """Surface-to-surface distance of two bodies [m]; 0 where their surfaces intersect.
+
+    ``first`` and ``second`` must be different ``Surface`` objects.
+    """
+    distance = fcl.distance(
+        first.at(world_from_first),
+        second.at(world_from_second),
+        fcl.DistanceRequest(),
+        fcl.DistanceResult(),
+    )
+    return max(float(distance), 0.0)
+
+
+def pairwise_gaps_m(
+    surfaces: Sequence[Surface],
+    poses: Sequence[Float[np.ndarray, "4 4"]],
+    beyond_m: float = NO_NEIGHBOUR_M,
+) -> Float[np.ndarray, "n n"]:
+    """Gap of every pair [m], inf on the diagonal.
+
+    beyond_m : pairs whose bounding boxes are farther apart than this are not measured and get
+        the boxes' distance, which is a lower bound of the gap.
+    """
+    count = len(surfaces)
+    gaps = np.full((count, count), NO_NEIGHBOUR_M)
+    boxes = [bounds_of(s.mesh, pose) for s, pose in zip(surfaces, poses, strict=True)]
+    for i in range(count):
+        for j in range(i + 1, count):
+            apart = box_distance_m(boxes[i], boxes[j])
+            if apart <= beyond_m:
+                apart = gap_m(surfaces[i], poses[i], surfaces[j], poses[j])
+            gaps[i, j] = gaps[j, i] = apart
+    return gaps
+
+
+def bounds_of(
+    mesh: Mesh, world_from_object: Float[np.ndarray, "4 4"]
+) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]:
+    """Lower and upper corner of the axis-aligned box in the world."""
+    vertices = mesh.transformed(world_from_object).vertices_m
+    return vertices.min(axis=0), vertices.max(axis=0)
+
+
+def box_distance_m(
+    first: tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]],
+    second: tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]],
+) -> float:
+    """Distance of two axis-aligned boxes, 0 where they overlap [m]."""
+    apart = np.maximum(first[0] - second[1], second[0] - first[1])
+    return float(np.linalg.norm(np.maximum(apart, 0.0)))
+
+
+def penetration_m(first: Mesh, second: Mesh) -> float:
+    """How deep vertices of either body lie inside the other [m]; both in the world, closed."""
+    return max(_deepest_vertex_m(first, second), _deepest_vertex_m(second, first))
+
+
+def _deepest_vertex_m(points_of: Mesh, inside_of: Mesh) -> float:
+    lower, upper = inside_of.vertices_m.min(axis=0), inside_of.vertices_m.max(axis=0)
+    vertices = points_of.vertices_m
+    near = vertices[((vertices > lower) & (vertices < upper)).all(axis=1)]
+    if len(near) == 0:
+        return 0.0
+    # From inside a closed surface, the first hit of any ray is seen from behind.
+    up = np.array([0.0, 0.0, 1.0])
+    rays = RayScene([inside_of])
+    hits = rays.cast(near, up)
+    inside = np.nan_to_num(rays.normals_at(hits)[:, 2]) > 0
+    if not inside.any():
+        return 0.0
+    surface = trimesh.Trimesh(inside_of.vertices_m, inside_of.faces, process=False)
+    _, distance, _ = trimesh.proximity.closest_point(surface, near[inside])
+    return float(distance.max())

@@ -1,0 +1,29 @@
+"""The nine complexity levels of Table II: shape class by distribution."""
+
+from enum import StrEnum
+
+from pipeline.geometry.shape import ShapeClass
+
+
+class Distribution(StrEnum):
+    """How objects lie; Supplement V, Fig. 3 (d)-(f)."""
+
+    ISOLATED = "isolated"
+    MULTIPLE = "multiple"
+    STACKED = "stacked"
+
+
+LEVELS = range(1, 10)
+
+
+def level_of(level: int) -> tuple[ShapeClass, Distribution]:
+    """Shape class and distribution of a level; Table II reads row by row.
+
+    Raises
+    ------
+    ValueError : not a level.
+    """
+    if level not in LEVELS:
+        raise ValueError(f"levels go from 1 to 9 (Table II), got {level}")
+    row, column = divmod(level - 1, 3)
+    return list(ShapeClass)[row], list(Distribution)[column]

@@ -1,0 +1,188 @@
+"""Where resting objects stand on the table: isolated by darts, multiple by sliding together.
+
+Both place objects in SE(2) (Supplement V): each keeps the rotation and height in which it rests
+and gets a yaw and a position. Gaps are those of the true meshes.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial.transform import Rotation
+
+from pipeline.clutter.gaps import Surface, bounds_of, box_distance_m, gap_m
+from pipeline.config.scenes import ScenesConfig
+from pipeline.errors import SceneError
+
+_DARTS_PER_OBJECT = 400
+_SLIDES_PER_OBJECT = 40
+_STEPS_PER_SLIDE = 200
+# Objects settle by some tenths of a millimetre after placement: keep this far inside the bounds.
+_MARGIN_M = 0.001
+# A slide has arrived when its gap is this near to the one wanted.
+_ARRIVED_M = 0.0002
+
+
+def place_isolated(
+    surfaces: Sequence[Surface],
+    resting: Sequence[Float[np.ndarray, "4 4"]],
+    config: ScenesConfig,
+    rng: np.random.Generator,
+) -> list[Float[np.ndarray, "4 4"]]:
+    """Every gap at least ``isolated_gap_min_m``: random places, refused while too near.
+
+    Raises
+    ------
+    SceneError : no room was found for an object.
+    """
+    placed: list[Float[np.ndarray, "4 4"]] = [np.eye(4)] * len(surfaces)
+    done: list[int] = []
+    # The largest first: the smallest find room between them.
+    order = np.argsort([-np.ptp(s.mesh.vertices_m, axis=0).max() for s in surfaces], kind="stable")
+    for index in (int(i) for i in order):
+        for _ in range(_DARTS_PER_OBJECT):
+            pose = turned(resting[index], rng.uniform(0, 2 * np.pi))
+            pose = moved(pose, *_inside(surfaces[index], pose, config, rng))
+            needed = config.isolated_gap_min_m + _MARGIN_M
+            if all(
+                _gap_at_least(surfaces[index], pose, surfaces[other], placed[other], needed)
+                for other in done
+            ):
+                placed[index] = pose
+                done.append(index)
+                break
+        else:
+            raise SceneError(
+                f"No room for object {len(done) + 1} of {len(surfaces)} with gaps of "
+                f"{1e3 * config.isolated_gap_min_m:.0f} mm",
+                "Raise scenes.workspace_side_m, or lower scenes.objects_per_clutter",
+            )
+    return placed
+
+
+def place_multiple(
+    surfaces: Sequence[Surface],
+    resting: Sequence[Float[np.ndarray, "4 4"]],
+    config: ScenesConfig,
+    rng: np.random.Generator,
+) -> list[Float[np.ndarray, "4 4"]]:
+    """Every object within ``multiple_gap_max_m`` of another, none overlapping.
+
+    Each object slides in from outside, towards one that stands already, until its nearest gap
+    is a random one within the bound.
+
+    Raises
+    ------
+    SceneError : an object found no place on the table.
+    """
+    placed = [turned(resting[0], rng.uniform(0, 2 * np.pi))]
+    for index in range(1, len(surfaces)):
+        for _ in range(_SLIDES_PER_OBJECT):
+            wanted = rng.uniform(_MARGIN_M, config.multiple_gap_max_m - 2 * _MARGIN_M)
+            pose = turned(resting[index], rng.uniform(0, 2 * np.pi))
+            target = placed[int(rng.integers(index))][:2, 3]
+            start = _outside(surfaces[: index + 1], placed, rng.uniform(0, 2 * np.pi))
+            pose = moved(pose, *start)
+            arrived = _slide(surfaces, placed, index, pose, target, wanted)
+            if arrived is not None and _on_workspace(surfaces[index], arrived, config):
+                placed.append(arrived)
+                break
+        else:
+            raise SceneError(
+                f"No place for object {index + 1} of {len(surfaces)} within "
+                f"{1e3 * config.multiple_gap_max_m:.0f} mm of another",
+                "Raise scenes.workspace_side_m, or draw another seed",
+            )
+    return placed
+
+
+def turned(pose: Float[np.ndarray, "4 4"], yaw_rad: float) -> Float[np.ndarray, "4 4"]:
+    """The pose turned about the vertical through its own origin, which moves to x = y = 0."""
+    out = pose.copy()
+    out[:3, :3] = Rotation.from_euler("z", yaw_rad).as_matrix() @ pose[:3, :3]
+    out[:2, 3] = 0.0
+    return out
+
+
+def moved(pose: Float[np.ndarray, "4 4"], x_m: float, y_m: float) -> Float[np.ndarray, "4 4"]:
+    """The pose with its origin above (x, y)."""
+    out = pose.copy()
+    out[:2, 3] = x_m, y_m
+    return out
+
+
+def _slide(
+    surfaces: Sequence[Surface],
+    placed: Sequence[Float[np.ndarray, "4 4"]],
+    index: int,
+    pose: Float[np.ndarray, "4 4"],
+    target_m: Float[np.ndarray, " 2"],
+    wanted_m: float,
+) -> Float[np.ndarray, "4 4"] | None:
+    """Move straight to the target until the nearest gap is the wanted one; None if it passes by.
+
+    A step as long as the excess gap can never overshoot: no point travels farther than it.
+    """
+    way = target_m - pose[:2, 3]
+    left = float(np.linalg.norm(way))
+    way = way / left
+    for _ in range(_STEPS_PER_SLIDE):
+        excess = (
+            min(
+                gap_m(surfaces[index], pose, surfaces[other], placed[other])
+                for other in range(len(placed))
+            )
+            - wanted_m
+        )
+        if abs(excess) <= _ARRIVED_M:
+            return pose
+        if excess < 0 or left <= 0:
+            return None
+        step = max(excess, _ARRIVED_M / 2)
+        pose = moved(pose, *(pose[:2, 3] + step * way))
+        left -= step
+    return None
+
+
+def _inside(
+    surface: Surface,
+    pose: Float[np.ndarray, "4 4"],
+    config: ScenesConfig,
+    rng: np.random.Generator,
+) -> Float[np.ndarray, " 2"]:
+    """A uniformly random position at which the object's box lies within the workspace."""
+    lower, upper = bounds_of(surface.mesh, pose)
+    half = config.workspace_side_m / 2
+    return rng.uniform(np.minimum(-half - lower[:2], 0), np.maximum(half - upper[:2], 0))
+
+
+def _on_workspace(surface: Surface, pose: Float[np.ndarray, "4 4"], config: ScenesConfig) -> bool:
+    lower, upper = bounds_of(surface.mesh, pose)
+    half = config.workspace_side_m / 2
+    return bool((lower[:2] >= -half).all() and (upper[:2] <= half).all())
+
+
+def _outside(
+    surfaces: Sequence[Surface], placed: Sequence[Float[np.ndarray, "4 4"]], azimuth_rad: float
+) -> Float[np.ndarray, " 2"]:
+    """A position in that direction, clear of all that stands already."""
+    reach = max(
+        float(np.abs(bound[:2]).max())
+        for surface, pose in zip(surfaces, placed, strict=False)
+        for bound in bounds_of(surface.mesh, pose)
+    )
+    own = float(np.linalg.norm(surfaces[-1].mesh.extents_m))
+    return (np.sqrt(2) * reach + own) * np.array([np.cos(azimuth_rad), np.sin(azimuth_rad)])
+
+
+def _gap_at_least(
+    first: Surface,
+    world_from_first: Float[np.ndarray, "4 4"],
+    second: Surface,
+    world_from_second: Float[np.ndarray, "4 4"],
+    needed_m: float,
+) -> bool:
+    boxes = bounds_of(first.mesh, world_from_first), bounds_of(second.mesh, world_from_second)
+    if box_distance_m(*boxes) >= needed_m:
+        return True
+    return gap_m(first, world_from_first, second, world_from_second) >= needed_m

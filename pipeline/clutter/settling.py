@@ -1,0 +1,50 @@
+"""Until everything rests: physics runs until speeds stay under their bounds, never a fixed count."""
+
+from collections.abc import Sequence
+
+import sapien
+
+from pipeline.config.scenes import ScenesConfig
+from pipeline.errors import SceneError
+from pipeline.simulation.engine import Body
+
+
+def settle(world: sapien.Scene, bodies: Sequence[Body], config: ScenesConfig) -> float:
+    """Step the world until every body has been at rest for a while; simulated time taken [s].
+
+    At rest: linear speed under ``settle_linear_m_s`` and rate under ``settle_angular_rad_s``
+    throughout ``settle_hold_s``.
+
+    Raises
+    ------
+    SceneError : still moving after ``settle_max_s``, or a body left the table.
+    """
+    resting_s = elapsed_s = 0.0
+    while resting_s < config.settle_hold_s:
+        if elapsed_s > config.settle_max_s:
+            raise SceneError(
+                f"The clutter still moved after {config.settle_max_s} s",
+                "Raise scenes.settle_max_s, or draw another seed",
+            )
+        world.step()
+        elapsed_s += config.timestep_s
+        resting_s = resting_s + config.timestep_s if _at_rest(bodies, config) else 0.0
+    return elapsed_s
+
+
+def fallen_off(bodies: Sequence[Body], config: ScenesConfig) -> list[Body]:
+    """Bodies whose centre of mass is beyond or below the table."""
+    half = config.table_side_m / 2
+    return [
+        body
+        for body in bodies
+        if abs(body.world_from_object[:2, 3]).max() > half or body.world_from_object[2, 3] < 0
+    ]
+
+
+def _at_rest(bodies: Sequence[Body], config: ScenesConfig) -> bool:
+    return all(
+        body.linear_speed_m_s < config.settle_linear_m_s
+        and body.angular_speed_rad_s < config.settle_angular_rad_s
+        for body in bodies
+    )

@@ -1,0 +1,1 @@
+"""Meshes, NSVR, convex parts, ray scenes and SE(3)."""

@@ -1,0 +1,112 @@
+"""The object catalogue: from a source mesh to everything later stages need of an object."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from pipeline.config.objects import ObjectsConfig
+from pipeline.geometry.convex_parts import convex_parts
+from pipeline.geometry.mesh import Mesh
+from pipeline.geometry.mesh_files import MeshSource, UnitSource
+from pipeline.geometry.repair import repair
+from pipeline.geometry.rescaling import draw_target_extent, rescale
+from pipeline.geometry.shape import (
+    ShapeClass,
+    mass_properties,
+    nsvr,
+    shape_class,
+    surface_area,
+    volume,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredObject:
+    """A source repaired to a watertight surface, at its own size; cheap to make."""
+
+    source: MeshSource
+    mesh: Mesh
+    repairs: tuple[str, ...]
+    nsvr: float
+    shape_class: ShapeClass
+
+
+@dataclass(frozen=True, eq=False)
+class CatalogueObject:
+    """An object at its final size; its frame's origin is its centre of mass."""
+
+    name: str
+    source: str
+    """The source file's path in its folder, or `parametric`."""
+    source_sha256: str
+    """Digest of the source file; `parametric` for the embedded objects."""
+    unit: str
+    unit_known_by: UnitSource
+    repairs: tuple[str, ...]
+    scale: float
+    """Rescaled size over the source's size in metres [1]."""
+    target_extent_m: float
+    area_m2: float
+    volume_m3: float
+    nsvr: float
+    """Eq. (15)."""
+    shape_class: ShapeClass
+    mass_kg: float
+    centre_of_mass_m: Float[np.ndarray, " 3"]
+    """In the object's frame: zero to rounding."""
+    inertia_kg_m2: Float[np.ndarray, "3 3"]
+    """About the centre of mass, along the object frame's axes."""
+    mesh: Mesh
+    convex_parts: tuple[Mesh, ...]
+    """Closed convex collision shapes, in the object's frame."""
+
+
+def measure_object(source: MeshSource, config: ObjectsConfig) -> MeasuredObject:
+    """Repair and NSVR. Raises MeshError where the source must be refused."""
+    mesh, repairs = repair(source.label, source.mesh, config.max_hole_fraction)
+    value = nsvr(mesh)
+    return MeasuredObject(source, mesh, repairs, value, shape_class(value))
+
+
+def finish_object(
+    measured: MeasuredObject, config: ObjectsConfig, rng: np.random.Generator, cache_dir: Path
+) -> CatalogueObject:
+    """Rescaling, centring, mass properties and convex parts (S-1.01's object, at its size).
+
+    rng: draws the target extent alone. cache_dir: where convex parts are kept. NSVR is the
+    measured one: rescaling does not change it.
+    """
+    target = draw_target_extent(config, rng)
+    scaled, scale = rescale(measured.mesh, target)
+    centre = mass_properties(scaled, config.density_kg_m3).centre_of_mass_m
+    mesh = Mesh(scaled.vertices_m - centre, scaled.faces)
+    mass = mass_properties(mesh, config.density_kg_m3)
+    source = measured.source
+    return CatalogueObject(
+        name=source.name,
+        source=source.label,
+        source_sha256=source.sha256,
+        unit=source.unit,
+        unit_known_by=source.unit_known_by,
+        repairs=measured.repairs,
+        scale=scale,
+        target_extent_m=target,
+        area_m2=surface_area(mesh),
+        volume_m3=volume(mesh),
+        nsvr=measured.nsvr,
+        shape_class=measured.shape_class,
+        mass_kg=mass.mass_kg,
+        centre_of_mass_m=mass.centre_of_mass_m,
+        inertia_kg_m2=mass.inertia_kg_m2,
+        mesh=mesh,
+        convex_parts=convex_parts(mesh, config.convex, cache_dir),
+    )
+
+
+def prepare_object(
+    source: MeshSource, config: ObjectsConfig, rng: np.random.Generator, cache_dir: Path
+) -> CatalogueObject:
+    """`measure_object`, then `finish_object`. Raises MeshError where the source is refused."""
+    return finish_object(measure_object(source, config), config, rng, cache_dir)

@@ -1,0 +1,163 @@
+"""Convex parts of a closed mesh for collision: CoACD, kept by content.
+
+Wei et al., "Approximate Convex Decomposition for 3D Meshes with Collision-Aware Concavity and
+Tree Search", 2022.
+"""
+
+import hashlib
+import importlib.metadata
+import os
+import tempfile
+import zipfile
+from pathlib import Path
+
+import coacd
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial import ConvexHull
+
+from pipeline.config.objects import ConvexPartsConfig
+from pipeline.geometry.manifolds import from_manifold, to_manifold
+from pipeline.geometry.mesh import Mesh
+from pipeline.geometry.shape import volume
+
+# PhysX cooks convex meshes of up to 255 vertices; fewer make contacts cheaper.
+_MOST_VERTICES = 64
+# A mesh that fills this share of its convex hull is its own only part.
+_CONVEX_SHARE = 0.995
+_SEED = 0
+_MOST_DECIMATION_SHARE = 0.02
+# Part of the cache key: raise it when what is computed from equal inputs changes.
+_METHOD_VERSION = 1
+
+
+def convex_parts(mesh: Mesh, config: ConvexPartsConfig, cache_dir: Path) -> tuple[Mesh, ...]:
+    """Closed convex meshes that together cover a closed mesh, in its frame.
+
+    At most config.max_parts parts of at most 64 vertices each; deterministic. Results are kept
+    in cache_dir by a digest of mesh, parameters and CoACD's version; a damaged entry is
+    recomputed.
+    """
+    entry = cache_dir / f"{cache_key(mesh, config)}.npz"
+    parts = _read(entry)
+    if parts is None:
+        parts = decompose(mesh, config)
+        _write(entry, parts)
+    return parts
+
+
+def decompose(mesh: Mesh, config: ConvexPartsConfig) -> tuple[Mesh, ...]:
+    """The convex parts, computed: the hull alone if the mesh is convex, else by CoACD.
+
+    The mesh is decimated to config.input_faces first, whose error is far below the concavity
+    that a part may have. CoACD's measure is relative to the mesh's size, so the parts of a
+    rescaled mesh are the rescaled parts.
+    """
+    hull = convex_hull(mesh.vertices_m)
+    if volume(mesh) >= _CONVEX_SHARE * volume(hull):
+        return (_within_limit(hull),)
+    coarse = decimate(mesh, config.input_faces)
+    coacd.set_log_level("off")
+    raw = coacd.run_coacd(
+        coacd.Mesh(coarse.vertices_m, coarse.faces.astype(np.int32)),
+        threshold=config.concavity,
+        max_convex_hull=config.max_parts,
+        preprocess_mode="auto",
+        resolution=config.resolution,
+        preprocess_resolution=config.preprocess_resolution,
+        mcts_iterations=config.search_iterations,
+        mcts_nodes=config.search_nodes,
+        seed=_SEED,
+    )
+    hulls = [convex_hull(np.asarray(vertices, dtype=np.float64)) for vertices, _ in raw]
+    return tuple(_within_limit(part) for part in hulls)
+
+
+def convex_hull(points_m: Float[np.ndarray, "n 3"]) -> Mesh:
+    """The convex hull as a closed mesh with outward faces.
+
+    Raises scipy.spatial.QhullError where the points lie in a plane.
+    """
+    # QJ moves flat points aside instead of merging facets: slivers of CoACD pass.
+    hull = ConvexHull(points_m, qhull_options="QJ Pp")
+    used, inverse = np.unique(hull.simplices, return_inverse=True)
+    vertices, faces = points_m[used], inverse.reshape(-1, 3)
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
+    faces[inward] = faces[inward][:, ::-1]
+    return Mesh(vertices, faces.astype(np.int64))
+
+
+def decimate(mesh: Mesh, faces: int) -> Mesh:
+    """A closed mesh simplified until it has at most the given number of faces; still closed.
+
+    Edges collapse within a tolerance, which doubles from a ten-thousandth of the longest extent
+    to at most 2 %: beyond that the shape matters more than the count.
+    """
+    extent = float(mesh.extents_m.max())
+    coarse, share = mesh, 1e-4
+    solid = to_manifold(mesh)
+    while len(coarse.faces) > faces and share <= _MOST_DECIMATION_SHARE:
+        coarse = from_manifold(solid.simplify(share * extent))
+        share *= 2
+    return coarse
+
+
+def cache_key(mesh: Mesh, config: ConvexPartsConfig) -> str:
+    """SHA-256 over everything that the parts depend on, as hexadecimal digits."""
+    digest = hashlib.sha256()
+    digest.update(np.ascontiguousarray(mesh.vertices_m, dtype="<f8").tobytes())
+    digest.update(np.ascontiguousarray(mesh.faces, dtype="<i8").tobytes())
+    version = importlib.metadata.version("coacd")
+    settings = (config.model_dump_json(), version, _METHOD_VERSION, len(mesh.vertices_m))
+    digest.update(repr(settings).encode())
+    return digest.hexdigest()
+
+
+def _within_limit(hull: Mesh) -> Mesh:
+    """A hull of at most 64 vertices: the ones farthest from each other, chosen greedily."""
+    points = hull.vertices_m
+    if len(points) <= _MOST_VERTICES:
+        return hull
+    first = int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))
+    chosen = [first]
+    distance = np.linalg.norm(points - points[first], axis=1)
+    while len(chosen) < _MOST_VERTICES:
+        chosen.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
+    return convex_hull(points[np.sort(chosen)])
+
+
+def _read(entry: Path) -> tuple[Mesh, ...] | None:
+    """The parts of a cache entry; None where there is none or it is damaged."""
+    try:
+        with np.load(entry, allow_pickle=False) as arrays:
+            vertices, faces = arrays["vertices_m"], arrays["faces"]
+            vertex_ends, face_ends = arrays["vertex_ends"], arrays["face_ends"]
+        if len(vertex_ends) == 0 or vertex_ends[-1] != len(vertices) or len(faces) == 0:
+            return None
+        parts = tuple(
+            Mesh(part_vertices, part_faces)
+            for part_vertices, part_faces in zip(
+                np.split(vertices, vertex_ends[:-1]), np.split(faces, face_ends[:-1]), strict=True
+            )
+        )
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        return None
+    return parts if all(part.faces.max() < len(part.vertices_m) for part in parts) else None
+
+
+def _write(entry: Path, parts: tuple[Mesh, ...]) -> None:
+    """Written beside its place and renamed: a reader never meets half an entry."""
+    entry.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.NamedTemporaryFile(dir=entry.parent, suffix=".tmp", delete=False) as file:
+        np.savez_compressed(
+            file,
+            vertices_m=np.concatenate([part.vertices_m for part in parts]),
+            faces=np.concatenate([part.faces for part in parts]),
+            vertex_ends=np.cumsum([len(part.vertices_m) for part in parts]),
+            face_ends=np.cumsum([len(part.faces) for part in parts]),
+        )
+        file.flush()
+        os.fsync(file.fileno())
+    Path(file.name).replace(entry)

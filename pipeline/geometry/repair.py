@@ -1,0 +1,213 @@
+"""From a mesh as it came to one watertight outer surface, every change recorded."""
+
+import manifold3d
+import numpy as np
+import trimesh
+from jaxtyping import Float, Int
+
+from pipeline.errors import MeshError
+from pipeline.geometry import topology
+from pipeline.geometry.manifolds import from_manifold, to_manifold
+from pipeline.geometry.mesh import Mesh
+from pipeline.geometry.shape import surface_area, volume
+
+# Vertices nearer than this share of the longest extent are one vertex written twice.
+_MERGE_SHARE = 1e-7
+# Parts with less of the largest part's volume are debris of the scan.
+_DEBRIS_SHARE = 1e-3
+# A cube has V / A^1.5 = 0.068; a sheet whose two sides coincide has none.
+_LEAST_FULLNESS = 1e-6
+
+
+def repair(label: str, mesh: Mesh, max_hole_fraction: float) -> tuple[Mesh, tuple[str, ...]]:
+    """The watertight outer surface, and what was done to get it (nothing: an empty tuple).
+
+    max_hole_fraction: largest share of the surface that closing its openings may add [1].
+    The result is closed, consistently wound, outward, of one connected body.
+    Raises MeshError, naming the mesh and the reason, where no honest repair leads there: an open
+    shell has no inside, and no number is made up for it.
+    """
+    done: list[str] = []
+    if not topology.is_closed(mesh):
+        mesh = _merge_vertices(mesh, done)
+        mesh = _drop_bad_faces(mesh, done)
+        if len(mesh.faces) == 0:
+            raise MeshError(f"{label} has no face of any area", "Mend the mesh")
+        _refuse_soup(label, mesh)
+        mesh = _consistent_winding(mesh, done)
+        mesh = _fill_holes(label, mesh, max_hole_fraction, done)
+    mesh = _outer_body(label, mesh, done)
+    mesh = _drop_unused_vertices(mesh)
+    _check_closed(label, mesh)
+    return mesh, tuple(done)
+
+
+def _merge_vertices(mesh: Mesh, done: list[str]) -> Mesh:
+    tolerance = _MERGE_SHARE * float(mesh.extents_m.max())
+    lower = mesh.vertices_m.min(axis=0)
+    cells = np.round((mesh.vertices_m - lower) / max(tolerance, 1e-300)).astype(np.int64)
+    _, first, inverse = np.unique(cells, axis=0, return_index=True, return_inverse=True)
+    merged = len(mesh.vertices_m) - len(first)
+    if merged == 0:
+        return mesh
+    done.append(f"merged {merged} duplicate vertices")
+    return Mesh(mesh.vertices_m[first], inverse.reshape(-1)[mesh.faces])
+
+
+def _drop_bad_faces(mesh: Mesh, done: list[str]) -> Mesh:
+    """Without faces that use a vertex twice, repeated faces, and pairs that face each other."""
+    a, b, c = mesh.faces.T
+    faces = mesh.faces[(a != b) & (b != c) & (c != a)]
+    if len(faces) < len(mesh.faces):
+        done.append(f"dropped {len(mesh.faces) - len(faces)} degenerate faces")
+    if len(faces) == 0:
+        return Mesh(mesh.vertices_m, faces)
+    _, group = np.unique(np.sort(faces, axis=1), axis=0, return_inverse=True)
+    group = group.reshape(-1)
+    turn = np.array([_turn(face) for face in faces])
+    balance = np.bincount(group, weights=turn)
+    # Of each set of faces over the same vertices, one stays, in the direction most of them have;
+    # as many one way as the other enclose nothing, and none stays.
+    order = np.flatnonzero((balance[group] != 0) & (np.sign(balance[group]) == turn))
+    _, first = np.unique(group[order], return_index=True)
+    keep = np.sort(order[first])
+    if len(keep) < len(faces):
+        done.append(f"dropped {len(faces) - len(keep)} coincident faces")
+    return Mesh(mesh.vertices_m, faces[keep])
+
+
+def _turn(face: Int[np.ndarray, " 3"]) -> int:
+    """+1 if the face names its vertices in cyclically ascending order, else -1."""
+    a, b, c = face
+    return 1 if (a < b < c) or (b < c < a) or (c < a < b) else -1
+
+
+def _refuse_soup(label: str, mesh: Mesh) -> None:
+    """Edges with three, five... faces bound no volume whichever way the faces are paired."""
+    _, counts = topology.undirected_edge_counts(mesh.faces)
+    odd = int(((counts > 2) & (counts % 2 == 1)).sum())
+    if odd:
+        raise MeshError(
+            f"{label} is not a surface: {odd} edges have three or more faces that do not pair up",
+            "Rebuild the mesh as one closed surface",
+        )
+
+
+def _consistent_winding(mesh: Mesh, done: list[str]) -> Mesh:
+    edges = topology.directed_edges(mesh.faces)
+    if len(np.unique(edges, axis=0)) == len(edges):
+        return mesh
+    work = trimesh.Trimesh(mesh.vertices_m, mesh.faces.copy(), process=False)
+    trimesh.repair.fix_winding(work)
+    turned = int((np.asarray(work.faces) != mesh.faces).any(axis=1).sum())
+    if turned == 0:
+        return mesh
+    done.append(f"turned {turned} faces to one winding")
+    return Mesh(mesh.vertices_m, np.asarray(work.faces, dtype=np.int64))
+
+
+def _fill_holes(label: str, mesh: Mesh, max_hole_fraction: float, done: list[str]) -> Mesh:
+    """Each opening closed by a fan about its middle, if all of them are small together."""
+    try:
+        loops = topology.boundary_loops(mesh.faces)
+    except ValueError as error:
+        raise MeshError(
+            f"{label} is not a surface: {error}", "Rebuild the mesh as one closed surface"
+        ) from error
+    if not loops:
+        return mesh
+    fans = [_fan(mesh.vertices_m, loop, len(mesh.vertices_m) + k) for k, loop in enumerate(loops)]
+    middles = np.array([mesh.vertices_m[loop].mean(axis=0) for loop in loops])
+    vertices = np.concatenate([mesh.vertices_m, middles])
+    caps = Mesh(vertices, np.concatenate(fans))
+    share = surface_area(caps) / surface_area(mesh)
+    if share > max_hole_fraction:
+        raise MeshError(
+            f"{label} is an open shell: closing its {len(loops)} opening(s) would invent "
+            f"{share:.1%} of its surface, more than the {max_hole_fraction:.1%} allowed",
+            "Give its wall a thickness, or close it, in a mesh editor",
+        )
+    done.append(f"closed {len(loops)} hole(s), {share:.2%} of the surface")
+    return Mesh(vertices, np.concatenate([mesh.faces, caps.faces]))
+
+
+def _fan(
+    vertices_m: Float[np.ndarray, "n 3"], loop: Int[np.ndarray, " k"], middle: int
+) -> Int[np.ndarray, "f 3"]:
+    """Triangles that close a loop: against the direction in which its faces run along it."""
+    if len(loop) == 3:
+        return loop[::-1].reshape(1, 3)
+    return np.column_stack([np.roll(loop, -1), loop, np.full(len(loop), middle)])
+
+
+def _outer_body(label: str, mesh: Mesh, done: list[str]) -> Mesh:
+    """One outward surface: parts turned outward, debris dropped, the rest united."""
+    parts = [topology.submesh(mesh, part) for part in topology.components(mesh.faces)]
+    if len(parts) == 1 and topology.is_closed(mesh):
+        return _outward(mesh, done)
+    solids = _solids(label, mesh)
+    outward = [_outward(solid, done) for solid in solids]
+    volumes = np.array([volume(solid) for solid in outward])
+    if not volumes.max() > 0.0:
+        raise MeshError(f"{label} encloses no volume", "Give its wall a thickness")
+    kept = [
+        solid
+        for solid, v in zip(outward, volumes, strict=True)
+        if v > _DEBRIS_SHARE * volumes.max()
+    ]
+    if len(kept) < len(solids):
+        done.append(f"dropped {len(solids) - len(kept)} specks")
+    if len(kept) == 1:
+        return kept[0]
+    united = manifold3d.Manifold.batch_boolean(
+        [_manifold(label, solid) for solid in kept], manifold3d.OpType.Add
+    )
+    done.append(f"united {len(kept)} overlapping or nested parts")
+    bodies = sorted(united.decompose(), key=lambda body: -body.volume())
+    rest = sum(body.volume() for body in bodies[1:]) / bodies[0].volume()
+    if rest > _DEBRIS_SHARE:
+        raise MeshError(
+            f"{label} is {len(bodies)} bodies that do not touch, not one rigid object",
+            "Put each body into a file of its own, or join them",
+        )
+    return from_manifold(bodies[0])
+
+
+def _solids(label: str, mesh: Mesh) -> list[Mesh]:
+    """Closed parts, larger first; where surfaces meet in an edge they are taken apart there."""
+    if topology.is_closed(mesh):
+        return [topology.submesh(mesh, part) for part in topology.components(mesh.faces)]
+    return [from_manifold(body) for body in _manifold(label, mesh).decompose()]
+
+
+def _outward(mesh: Mesh, done: list[str]) -> Mesh:
+    if volume(mesh) >= 0.0:
+        return mesh
+    done.append("turned a part inside out")
+    return Mesh(mesh.vertices_m, mesh.faces[:, ::-1])
+
+
+def _manifold(label: str, mesh: Mesh) -> manifold3d.Manifold:
+    try:
+        return to_manifold(mesh)
+    except ValueError as error:
+        raise MeshError(
+            f"{label} is not a surface: its faces do not pair up along their edges",
+            "Rebuild the mesh as one closed surface",
+        ) from error
+
+
+def _drop_unused_vertices(mesh: Mesh) -> Mesh:
+    if len(np.unique(mesh.faces)) == len(mesh.vertices_m):
+        return mesh
+    return topology.submesh(mesh, np.arange(len(mesh.faces)))
+
+
+def _check_closed(label: str, mesh: Mesh) -> None:
+    if not topology.is_closed(mesh):
+        raise MeshError(
+            f"{label} cannot be made watertight: after repair some edges still have not two faces",
+            "Rebuild the mesh as one closed surface",
+        )
+    if volume(mesh) < _LEAST_FULLNESS * surface_area(mesh) ** 1.5:
+        raise MeshError(f"{label} encloses no volume", "Give its wall a thickness")

@@ -1,0 +1,24 @@
+"""Sizes of the training objects: each mesh is rescaled to a drawn target; Supplement III."""
+
+import numpy as np
+
+from pipeline.config.objects import ObjectsConfig
+from pipeline.geometry.mesh import Mesh
+
+
+def draw_target_extent(config: ObjectsConfig, rng: np.random.Generator) -> float:
+    """Longest extent after rescaling, uniform between the configured bounds [m]."""
+    return float(rng.uniform(config.target_extent_min_m, config.target_extent_max_m))
+
+
+def rescale(mesh: Mesh, target_extent_m: float) -> tuple[Mesh, float]:
+    """The mesh scaled about its origin so that its longest extent is the target, and the scale.
+
+    The longest extent is that of the axis-aligned box in the mesh's own frame.
+    Raises ValueError for a mesh of extent zero.
+    """
+    longest = float(mesh.extents_m.max())
+    if not longest > 0.0:
+        raise ValueError("a mesh of extent zero cannot be rescaled")
+    scale = target_extent_m / longest
+    return Mesh(mesh.vertices_m * scale, mesh.faces), scale

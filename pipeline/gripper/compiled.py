@@ -1,0 +1,24 @@
+"""The one way functions of this package are compiled to machine code.
+
+A compiled function may call only compiled functions of its own module:
+numba's disk cache looks at the date of the caller's file alone, so a call
+across modules could run an outdated callee.
+"""
+
+from collections.abc import Callable
+from typing import Any, TypeVar, cast
+
+import numba
+
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def compiled(function: Function) -> Function:
+    """Compile with IEEE arithmetic: NaN and -inf heights keep their meaning."""
+    return cast(Function, numba.njit(cache=True, error_model="numpy")(function))
+
+
+def compiled_finite(function: Function) -> Function:
+    """Compile for finite arguments; sums may be regrouped so that they run in SIMD lanes."""
+    flags = {"reassoc", "contract", "nsz", "nnan"}
+    return cast(Function, numba.njit(cache=True, error_model="numpy", fastmath=flags)(function))

@@ -1,0 +1,47 @@
+"""What a soft contact can bear: Eq. (7)-(13), as bounds on GW and on W."""
+
+import math
+
+import numpy as np
+from jaxtyping import Float
+
+WRENCH_AXES = ("F_x", "F_y", "F_z", "T_z")
+
+
+def wrench_limit_ratios(
+    friction: float,
+) -> tuple[Float[np.ndarray, " 4"], Float[np.ndarray, " 4"]]:
+    """Lower and upper bound of GW over F_v: Eq. (8)-(11).
+
+    The torque of G is divided by r_G, so r_G drops out of Eq. (11).
+    """
+    side = math.sqrt(3) / 3 * friction
+    lower = np.array([-side, -side, 0.0, -side])  # Eq. (8), (9), (10), (11)
+    upper = np.array([side, side, 1.0, side])
+    return lower, upper
+
+
+def wrench_limits(
+    vacuum_force: float, friction: float
+) -> tuple[Float[np.ndarray, " 4"], Float[np.ndarray, " 4"]]:
+    """Lower and upper bound of GW in units of G: Eq. (8)-(11).
+
+    Parameters
+    ----------
+    vacuum_force : F_v of Eq. (7), in units of G.
+    friction : mu [1].
+    """
+    lower, upper = wrench_limit_ratios(friction)
+    return vacuum_force * lower, vacuum_force * upper
+
+
+def limit_slacks(
+    wrench: Float[np.ndarray, "*batch 4"],
+    lower: Float[np.ndarray, "*batch 4"],
+    upper: Float[np.ndarray, "*batch 4"],
+) -> Float[np.ndarray, "*batch 8"]:
+    """Slack of each scalar inequality of Eq. (8)-(11); negative where it is broken.
+
+    Columns: room to the upper bound of F_x, F_y, F_z, T_z, then to the lower bound of each.
+    """
+    return np.concatenate([upper - wrench, wrench - lower], axis=-1)

@@ -1,0 +1,1 @@
+"""GA-CNN: the network, its family, its training, its figures; Supplement IV."""

@@ -1,0 +1,118 @@
+"""What a network has to beat: the mean, and a seal ratio measured by hand."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.optimize import isotonic_regression
+
+from pipeline.network.figures import mean_absolute_error
+
+# Below so many cells a plane is not fitted: the ratio is 0.
+_FEWEST_CELLS = 3
+
+
+def mean_predictor_mae(
+    train_quality: Float[np.ndarray, " m"], test_quality: Float[np.ndarray, " n"]
+) -> float:
+    """Mean |q̂ − q| of predicting the training samples' mean for every test sample."""
+    constant = np.full(test_quality.shape, train_quality.mean(dtype=np.float64))
+    return mean_absolute_error(constant, test_quality)
+
+
+def seal_ratio(
+    cloud: Float[np.ndarray, "n h w 3"],
+    mask: Bool[np.ndarray, "n h w"],
+    seal_radius: float,
+    tolerance: float,
+) -> Float[np.ndarray, " n"]:
+    """Share of the cells under Reg.V that are seen and lie near the plane through them.
+
+    A hand-made stand-in for the contact share of Eq. (2), from the cloud alone. The plane is
+    fitted twice: to all seen cells of Reg.V, then to those within ``tolerance`` of their median
+    residual, so that an edge within Reg.V does not tilt it.
+
+    Parameters
+    ----------
+    cloud : points in GCS in units of r_G.
+    mask : cells that hold a measured point.
+    seal_radius : r_v in units of r_G.
+    tolerance : distance from the plane that still counts as near, in units of r_G.
+    """
+    n = len(mask)
+    points = np.where(mask[..., None], cloud, 0).astype(np.float64)
+    seen_radius = np.hypot(points[..., 0], points[..., 1])
+    inside = mask & (seen_radius <= seal_radius)
+    # Unseen cells count against the seal: take the cells of Reg.V from the grid, whose spacing
+    # is that of the seen points.
+    cells = _cells_within(cloud, mask, seal_radius)
+    ratios = np.zeros(n)
+    for index in range(n):
+        patch = points[index][inside[index]]
+        if len(patch) < _FEWEST_CELLS or cells == 0:
+            continue
+        residual = _plane_residual(patch, patch)
+        near = np.abs(residual - np.median(residual)) <= tolerance
+        if near.sum() >= _FEWEST_CELLS:
+            residual = _plane_residual(patch[near], patch)
+            near = np.abs(residual) <= tolerance
+        ratios[index] = min(near.sum() / cells, 1.0)
+    return ratios
+
+
+@dataclass(frozen=True)
+class MonotoneRegressor:
+    """A rising step function from a feature to quality, straight between its knots."""
+
+    feature: Float[np.ndarray, " knots"]
+    quality: Float[np.ndarray, " knots"]
+
+    def predict(self, feature: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
+        """Quality at each feature; constant beyond the outermost knots."""
+        quality: Float[np.ndarray, " n"] = np.interp(feature, self.feature, self.quality)
+        return quality
+
+
+def fit_monotone(
+    feature: Float[np.ndarray, " n"], quality: Float[np.ndarray, " n"]
+) -> MonotoneRegressor:
+    """Isotonic regression of quality on one feature, least squares."""
+    knots, group = np.unique(feature, return_inverse=True)
+    counts = np.bincount(group).astype(np.float64)
+    means = np.bincount(group, weights=quality.astype(np.float64)) / counts
+    rising = isotonic_regression(means, weights=counts, increasing=True)
+    return MonotoneRegressor(feature=knots, quality=np.asarray(rising.x))
+
+
+def _cells_within(
+    cloud: Float[np.ndarray, "n h w 3"], mask: Bool[np.ndarray, "n h w"], radius: float
+) -> int:
+    """Cells of the grid whose centre lies within ``radius`` of the axis."""
+    h, w = mask.shape[1:]
+    x_by_column = _spacing(cloud[..., 0], mask, axis=2)
+    y_by_row = _spacing(cloud[..., 1], mask, axis=1)
+    x = x_by_column * (np.arange(w) - (w - 1) / 2)
+    y = y_by_row * (np.arange(h) - (h - 1) / 2)
+    return int((np.hypot(x[None, :], y[:, None]) <= radius).sum())
+
+
+def _spacing(
+    coordinate: Float[np.ndarray, "n h w"], mask: Bool[np.ndarray, "n h w"], axis: int
+) -> float:
+    """Step of a coordinate from cell to cell: least squares through the grid's middle."""
+    size = mask.shape[axis]
+    steps = np.arange(size) - (size - 1) / 2
+    shape = (1, size, 1) if axis == 1 else (1, 1, size)
+    step = np.broadcast_to(steps.reshape(shape), mask.shape)[mask]
+    seen = coordinate[mask].astype(np.float64)
+    return float(step @ seen / max(float(step @ step), 1.0))
+
+
+def _plane_residual(
+    fitted: Float[np.ndarray, "m 3"], points: Float[np.ndarray, "n 3"]
+) -> Float[np.ndarray, " n"]:
+    """Height of ``points`` over the least-squares plane z = a x + b y + c of ``fitted``."""
+    design = np.column_stack((fitted[:, :2], np.ones(len(fitted))))
+    plane = np.linalg.lstsq(design, fitted[:, 2], rcond=None)[0]
+    residual: Float[np.ndarray, " n"] = points[:, 2] - points[:, :2] @ plane[:2] - plane[2]
+    return residual

@@ -1,0 +1,120 @@
+"""A trained network as bytes: safetensors with the configuration beside; loading runs no code."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+
+import torch
+from pydantic import ValidationError
+from safetensors import SafetensorError
+from safetensors.torch import load, save
+from torch import Tensor
+
+from pipeline.config.learning import NetworkConfig
+from pipeline.errors import ArtifactError, ConfigError
+from pipeline.network.canonical import CHANNELS
+from pipeline.network.ga_cnn import GaCnn, build_network
+
+FORMAT = "softgrip.ga-cnn"
+# Rises whenever an older reader would misread the weights or the input's channels.
+FORMAT_VERSION = 1
+
+_HEADER_LENGTH_BYTES = 8
+_DIGEST_KEY = "sha256"
+_REMEDY = "Train the network again, or pass a checkpoint that this version wrote."
+
+
+def save_checkpoint_bytes(network: GaCnn) -> bytes:
+    """Weights and configuration; equal networks give equal bytes."""
+    metadata = {
+        "format": FORMAT,
+        "version": str(FORMAT_VERSION),
+        "channels": json.dumps(CHANNELS),
+        "network": network.config.model_dump_json(),
+    }
+    return tensors_to_bytes(network.state_dict(), metadata)
+
+
+def load_checkpoint_bytes(data: bytes) -> GaCnn:
+    """The network of a checkpoint, on the CPU and ready to predict.
+
+    Raises
+    ------
+    ArtifactError : the bytes are no checkpoint, are damaged, or are of another version.
+    """
+    tensors, metadata = tensors_from_bytes(data, "network checkpoint")
+    if metadata.get("format") != FORMAT:
+        raise ArtifactError(
+            f"network checkpoint is of format {metadata.get('format')!r}, not {FORMAT!r}", _REMEDY
+        )
+    if metadata.get("version") != str(FORMAT_VERSION):
+        raise ArtifactError(
+            f"network checkpoint is of version {metadata.get('version')}, "
+            f"this program reads version {FORMAT_VERSION}",
+            _REMEDY,
+        )
+    if metadata.get("channels") != json.dumps(CHANNELS):
+        raise ArtifactError(
+            f"network checkpoint expects the input channels {metadata.get('channels')}, "
+            f"this program makes {json.dumps(CHANNELS)}",
+            _REMEDY,
+        )
+    try:
+        config = NetworkConfig.model_validate_json(metadata.get("network", ""))
+        network = build_network(config, seed=0)
+        network.load_state_dict(tensors)
+    except (ValidationError, ConfigError, RuntimeError) as error:
+        reason = str(error).splitlines()[0]
+        raise ArtifactError(
+            f"network checkpoint does not fit its own configuration: {reason}", _REMEDY
+        ) from error
+    if not all(bool(torch.isfinite(tensor).all()) for tensor in tensors.values()):
+        raise ArtifactError("network checkpoint holds weights that are not finite", _REMEDY)
+    return network.eval()
+
+
+def tensors_to_bytes(tensors: Mapping[str, Tensor], metadata: Mapping[str, str]) -> bytes:
+    """Safetensors bytes with a digest of the payload; equal content gives equal bytes.
+
+    The library writes metadata in the order of a hash map, which differs from run to run: the
+    header is written anew with its keys in order.
+    """
+    plain = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
+    data = save(plain, dict(metadata))
+    length = int.from_bytes(data[:_HEADER_LENGTH_BYTES], "little")
+    end = _HEADER_LENGTH_BYTES + length
+    entries = json.loads(data[_HEADER_LENGTH_BYTES:end])
+    entries["__metadata__"] = dict(metadata)
+    entries["__metadata__"] = {**metadata, _DIGEST_KEY: _digest(entries, data[end:])}
+    header = json.dumps(entries, sort_keys=True, separators=(",", ":")).encode()
+    header += b" " * (-len(header) % _HEADER_LENGTH_BYTES)
+    return len(header).to_bytes(_HEADER_LENGTH_BYTES, "little") + header + data[end:]
+
+
+def tensors_from_bytes(data: bytes, what: str) -> tuple[dict[str, Tensor], dict[str, str]]:
+    """Tensors and metadata of safetensors bytes.
+
+    Raises
+    ------
+    ArtifactError : the bytes are not whole safetensors; the message calls them ``what``.
+    """
+    try:
+        tensors = load(data)
+        length = int.from_bytes(data[:_HEADER_LENGTH_BYTES], "little")
+        end = _HEADER_LENGTH_BYTES + length
+        entries = json.loads(data[_HEADER_LENGTH_BYTES:end])
+    except (SafetensorError, ValueError, KeyError) as error:
+        raise ArtifactError(
+            f"{what} is damaged or no safetensors data: {error}", _REMEDY
+        ) from error
+    metadata = entries.get("__metadata__", {})
+    if metadata.pop(_DIGEST_KEY, None) != _digest(entries, data[end:]):
+        raise ArtifactError(f"{what} is damaged: its SHA-256 does not match its content", _REMEDY)
+    return tensors, metadata
+
+
+def _digest(entries: Mapping[str, object], payload: bytes) -> str:
+    """SHA-256 over everything but itself: the header's entries in order, then the payload."""
+    digest = hashlib.sha256(json.dumps(entries, sort_keys=True).encode())
+    digest.update(payload)
+    return digest.hexdigest()

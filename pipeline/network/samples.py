@@ -1,0 +1,84 @@
+"""What the network learns from: arrays of clouds, masks and qualities."""
+
+import hashlib
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from pipeline.errors import ArtifactError
+
+_REMEDY = "Make the shards again."
+# So many samples show which way the grid lies.
+_ORIENTATION_SAMPLES = 64
+
+
+@dataclass(frozen=True)
+class GraspTensors:
+    """Labelled samples, held in memory or mapped from a file.
+
+    Attributes
+    ----------
+    cloud : points in GCS in units of r_G, half or single precision; y grows with the row, x with
+        the column (see ``canonical``).
+    mask : cells that hold a measured point.
+    quality : q in [0, 1].
+
+    Raises
+    ------
+    ArtifactError : on construction, where shapes disagree, a quality is outside [0, 1], or the
+        grid lies the other way.
+    """
+
+    cloud: Float[np.ndarray, "n h w 3"]
+    mask: Bool[np.ndarray, "n h w"]
+    quality: Float[np.ndarray, " n"]
+
+    def __post_init__(self) -> None:
+        n = len(self.quality)
+        if (
+            self.cloud.ndim != 4
+            or self.cloud.shape[1] != self.cloud.shape[2]
+            or self.cloud.shape != (*self.mask.shape, 3)
+            or self.quality.shape != (self.cloud.shape[0],)
+        ):
+            raise ArtifactError(
+                f"samples disagree in shape: cloud {self.cloud.shape}, mask {self.mask.shape}, "
+                f"quality {self.quality.shape}",
+                _REMEDY,
+            )
+        if n == 0:
+            raise ArtifactError("a split holds no samples", "Ask for more grasps or objects.")
+        if not bool(np.all((self.quality >= 0) & (self.quality <= 1))):
+            raise ArtifactError("samples hold a quality outside [0, 1]", _REMEDY)
+        _check_orientation(self.cloud[:_ORIENTATION_SAMPLES], self.mask[:_ORIENTATION_SAMPLES])
+
+    def __len__(self) -> int:
+        return len(self.quality)
+
+    def sha256(self) -> str:
+        """Digest of the content, as hex."""
+        digest = hashlib.sha256()
+        for array in (self.cloud, self.mask, self.quality):
+            digest.update(f"{array.dtype.str}{array.shape}".encode())
+            digest.update(np.ascontiguousarray(array).data)
+        return digest.hexdigest()
+
+
+def _check_orientation(
+    cloud: Float[np.ndarray, "n h w 3"], mask: Bool[np.ndarray, "n h w"]
+) -> None:
+    """Raise ArtifactError where x falls along the columns or y along the rows."""
+    side = cloud.shape[1]
+    step = np.arange(side) - (side - 1) / 2
+    x = np.where(mask, cloud[..., 0], 0).astype(np.float64)
+    y = np.where(mask, cloud[..., 1], 0).astype(np.float64)
+    along = {"x": (x * step[None, None, :]).sum(), "y": (y * step[None, :, None]).sum()}
+    across = {"x": (x * step[None, :, None]).sum(), "y": (y * step[None, None, :]).sum()}
+    for axis in ("x", "y"):
+        if mask.any() and along[axis] <= abs(across[axis]):
+            raise ArtifactError(
+                f"clouds do not lie as expected: {axis} must grow with the "
+                f"{'column' if axis == 'x' else 'row'}",
+                _REMEDY,
+            )

@@ -1,0 +1,1 @@
+"""Cameras, depth rendering, depth noise and organised sub point clouds."""

@@ -1,0 +1,1 @@
+"""The SAPIEN world: Vulkan driver, table, bodies, their shading and lights."""

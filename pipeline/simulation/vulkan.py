@@ -1,0 +1,52 @@
+"""Which Vulkan driver renders: the machine's GPU, or Mesa's lavapipe on the CPU."""
+
+import os
+from pathlib import Path
+
+import sapien
+
+from pipeline.errors import MachineError
+
+_LAVAPIPE_MANIFESTS = "lvp_icd*.json"
+_MANIFEST_FOLDERS = (
+    Path("/etc/vulkan/icd.d"),
+    Path("/usr/local/share/vulkan/icd.d"),
+    Path("/usr/share/vulkan/icd.d"),
+)
+_USER_CHOICES = ("VK_ICD_FILENAMES", "VK_DRIVER_FILES")
+
+
+def gpu_present() -> bool:
+    """Whether the kernel offers a GPU to this process."""
+    devices = Path("/dev")
+    return any(devices.glob("nvidia[0-9]*")) or any(devices.glob("dri/renderD*"))
+
+
+def choose_vulkan_driver() -> None:
+    """Name lavapipe to the Vulkan loader where there is no GPU and the user named no driver.
+
+    Must run before the process's first render system. Does nothing where a GPU is present,
+    where VK_ICD_FILENAMES or VK_DRIVER_FILES is set, or where lavapipe is not installed.
+    """
+    if gpu_present() or any(os.environ.get(name) for name in _USER_CHOICES):
+        return
+    for folder in _MANIFEST_FOLDERS:
+        for manifest in sorted(folder.glob(_LAVAPIPE_MANIFESTS)):
+            os.environ["VK_ICD_FILENAMES"] = str(manifest)
+            return
+
+
+def new_render_system() -> sapien.render.RenderSystem:
+    """A SAPIEN render system on the chosen driver.
+
+    Raises MachineError where no Vulkan driver can render.
+    """
+    choose_vulkan_driver()
+    try:
+        return sapien.render.RenderSystem()
+    except RuntimeError as error:
+        raise MachineError(
+            f"no Vulkan driver on this machine can render ({error})",
+            "Run `make doctor` for the command that installs Mesa's lavapipe (24.3 or newer), "
+            "or render with Embree rays, which need no driver.",
+        ) from error
