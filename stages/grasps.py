@@ -37,16 +37,11 @@ from pipeline.execution import (
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.raycasting import RayScene
-from pipeline.gripper import (
-    LIMIT_NAMES,
-    GraspStatus,
-    Labels,
-    Pad,
-    build_pad,
-    joined_labels,
-    label_batch,
-)
+from pipeline.geometry.table import table_mesh
+from pipeline.gripper import GraspStatus, LabelBatch, Pad, build_pad, label_batch
 from pipeline.gripper.balancing import flattened, quality_histogram, rare_grasps
+from pipeline.gripper.draping import drape
+from pipeline.gripper.limits import LIMIT_NAMES
 from pipeline.gripper.sampling import (
     Candidates,
     Proposal,
@@ -205,7 +200,7 @@ def grasps_of_view(
     surface = visible_surface(view, rays, body_ids)
     tried = int(np.ceil(wanted * config.grasps.oversampling))
     candidates, labels = label_rounds(surface, rays, body_ids, config, tried, rng)
-    kept, probability = flattened(labels.quality, wanted, config.grasps.balance, rng)
+    kept, probability = flattened(labels.q, wanted, config.grasps.balance, rng)
     candidates, labels = candidates.take(kept), labels.take(kept)
     # S-1.13 - S-1.15: the camera's picture, disturbed, transformed, desampled.
     measured = disturb(view, config.sensing, rng)
@@ -222,7 +217,7 @@ def grasps_of_view(
         object_index=candidates.body_id,
         body_id=candidates.body_id,
         world_from_gripper=first_touch,
-        quality=labels.quality,
+        quality=labels.q,
         pressure=labels.pressure,
         wrench=labels.wrench,
         limit_slack=labels.slacks,
@@ -246,7 +241,7 @@ def label_rounds(
     config: RunConfig,
     tried: int,
     rng: np.random.Generator,
-) -> tuple[Candidates, Labels]:
+) -> tuple[Candidates, LabelBatch]:
     """S-1.04 - S-1.12 in two rounds: over all that is seen, then near what is rare."""
     pad = pad_of(config)
     bodies = np.unique(surface.body_id)
@@ -259,7 +254,7 @@ def label_rounds(
         ]
     )
     labels = label_candidates(candidates, rays, body_ids, pad, config)
-    origins = rare_grasps(labels.quality, tried - first, rng)
+    origins = rare_grasps(labels.q, tried - first, rng)
     near = joined(
         [
             propose_nearby(
@@ -272,7 +267,7 @@ def label_rounds(
         ]
     )
     near_labels = label_candidates(near, rays, body_ids, pad, config)
-    return joined([candidates, near]), labels.followed_by(near_labels)
+    return joined([candidates, near]), LabelBatch.joined([labels, near_labels])
 
 
 def label_candidates(
@@ -281,7 +276,7 @@ def label_candidates(
     body_ids: np.ndarray,
     pad: Pad,
     config: RunConfig,
-) -> Labels:
+) -> LabelBatch:
     """S-1.07 - S-1.12 for every candidate: its pad's heights by rays, then the label."""
     parts = []
     for start in range(0, len(candidates), ROUND):
@@ -289,7 +284,7 @@ def label_candidates(
         heights, below = pad_heights(frames, rays, pad, config.grasps.clearance_m)
         on_target = body_ids[below] == candidates.body_id[start : start + ROUND, None]
         parts.append(label_batch(pad, config.gripper, heights, on_target & (below >= 0)))
-    return joined_labels(parts)
+    return LabelBatch.joined(parts)
 
 
 def pad_heights(

@@ -10,6 +10,7 @@ import os
 import tempfile
 import zipfile
 from pathlib import Path
+from typing import Literal
 
 import coacd
 import numpy as np
@@ -22,10 +23,12 @@ from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.shape import volume
 
 # PhysX cooks convex meshes of up to 255 vertices; fewer make contacts cheaper.
-_MOST_VERTICES = 64
+_MOST_VERTICES = 200
 # A mesh that fills this share of its convex hull is its own only part.
 _CONVEX_SHARE = 0.995
 _SEED = 0
+# Parts with less of the mesh's volume than this have lost some of it.
+_LEAST_COVERAGE = 0.9
 _MOST_DECIMATION_SHARE = 0.02
 # Part of the cache key: raise it when what is computed from equal inputs changes.
 _METHOD_VERSION = 1
@@ -34,7 +37,7 @@ _METHOD_VERSION = 1
 def convex_parts(mesh: Mesh, config: ConvexPartsConfig, cache_dir: Path) -> tuple[Mesh, ...]:
     """Closed convex meshes that together cover a closed mesh, in its frame.
 
-    At most config.max_parts parts of at most 64 vertices each; deterministic. Results are kept
+    At most config.max_parts parts of at most 200 vertices each; deterministic. Results are kept
     in cache_dir by a digest of mesh, parameters and CoACD's version; a damaged entry is
     recomputed.
     """
@@ -57,16 +60,25 @@ def decompose(mesh: Mesh, config: ConvexPartsConfig) -> tuple[Mesh, ...]:
     if volume(mesh) >= _CONVEX_SHARE * volume(hull):
         return (_within_limit(hull),)
     coarse = decimate(mesh, config.input_faces)
+    parts = _run_coacd(coarse, config, "off")
+    if sum(volume(part) for part in parts) < _LEAST_COVERAGE * volume(mesh):
+        parts = _run_coacd(coarse, config, "on")
+    return parts
+
+
+def _run_coacd(
+    mesh: Mesh, config: ConvexPartsConfig, preprocess: Literal["on", "off"]
+) -> tuple[Mesh, ...]:
+    """CoACD's parts. Its preprocessing rebuilds the surface, at up to six times the cost and
+    with thicker walls: needed only where cutting the closed surface itself loses material."""
     coacd.set_log_level("off")
     raw = coacd.run_coacd(
-        coacd.Mesh(coarse.vertices_m, coarse.faces.astype(np.int32)),
+        coacd.Mesh(mesh.vertices_m, mesh.faces.astype(np.int32)),
         threshold=config.concavity,
         max_convex_hull=config.max_parts,
-        preprocess_mode="auto",
+        preprocess_mode=preprocess,
         resolution=config.resolution,
-        preprocess_resolution=config.preprocess_resolution,
         mcts_iterations=config.search_iterations,
-        mcts_nodes=config.search_nodes,
         seed=_SEED,
     )
     hulls = [convex_hull(np.asarray(vertices, dtype=np.float64)) for vertices, _ in raw]
@@ -115,7 +127,7 @@ def cache_key(mesh: Mesh, config: ConvexPartsConfig) -> str:
 
 
 def _within_limit(hull: Mesh) -> Mesh:
-    """A hull of at most 64 vertices: the ones farthest from each other, chosen greedily."""
+    """A hull of at most 200 vertices: the ones farthest from each other, chosen greedily."""
     points = hull.vertices_m
     if len(points) <= _MOST_VERTICES:
         return hull

@@ -5,7 +5,8 @@ kernels over a block of grasps: draping, then contact with pressure and wrench m
 the QP, then the label. Workspaces belong to the block, so nothing is allocated per grasp.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -48,6 +49,20 @@ class LabelBatch:
 
     def __len__(self) -> int:
         return len(self.q)
+
+    def take(self, chosen: Int[np.ndarray, " k"]) -> "LabelBatch":
+        """Those at the given indices."""
+        return LabelBatch(*(getattr(self, field.name)[chosen] for field in fields(self)))
+
+    @staticmethod
+    def joined(parts: Sequence["LabelBatch"]) -> "LabelBatch":
+        """Several batches as one, in order; at least one."""
+        return LabelBatch(
+            *(
+                np.concatenate([getattr(part, field.name) for part in parts])
+                for field in fields(LabelBatch)
+            )
+        )
 
     def __getitem__(self, index: int) -> GraspQuality:
         """One grasp of the batch."""

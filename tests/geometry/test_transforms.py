@@ -73,7 +73,8 @@ def test_look_at_puts_the_target_on_the_optical_axis(
     target_camera = transforms.transform_points(
         transforms.invert(world_from_camera), eye + direction
     )
-    np.testing.assert_allclose(target_camera, [0, 0, np.linalg.norm(direction)], atol=1e-10)
+    on_axis = np.array([0.0, 0.0, float(np.linalg.norm(direction))])
+    np.testing.assert_allclose(target_camera, on_axis, atol=1e-10)
     assert world_from_camera[2, 1] <= 1e-9, "y of the camera must not point up"
 
 

@@ -1,0 +1,67 @@
+"""Pictures of a scene: SAPIEN's renderer, or Embree rays where no Vulkan driver is."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Protocol
+
+from loguru import logger
+
+from pipeline.clutter.scene import ClutterScene
+from pipeline.config.scenes import ScenesConfig
+from pipeline.errors import MachineError
+from pipeline.geometry.catalogue import CatalogueObject
+from pipeline.sensing.cameras import PinholeCamera
+from pipeline.sensing.ray_rendering import ray_view
+from pipeline.sensing.sapien_rendering import sapien_views
+from pipeline.simulation.vulkan import new_render_system
+
+
+class SceneRenderer(Protocol):
+    """Adds each camera's view to a scene."""
+
+    name: str
+
+    def rendered(self, scene: ClutterScene, objects: Mapping[str, CatalogueObject]) -> ClutterScene:
+        """The same scene with its views."""
+        ...
+
+
+class SapienRenderer:
+    """SAPIEN's rasteriser on a GPU or on lavapipe."""
+
+    name = "sapien"
+
+    def __init__(self, config: ScenesConfig, cameras: tuple[PinholeCamera, ...]) -> None:
+        new_render_system()  # fails here, with a remedy, where nothing can render
+        self._config = config
+        self._cameras = cameras
+
+    def rendered(self, scene: ClutterScene, objects: Mapping[str, CatalogueObject]) -> ClutterScene:
+        """The same scene with its views."""
+        return replace(scene, views=sapien_views(scene, objects, self._config, self._cameras))
+
+
+class RayRenderer:
+    """Embree rays: pure pip, slower in colour, equal in depth."""
+
+    name = "embree"
+
+    def __init__(self, config: ScenesConfig, cameras: tuple[PinholeCamera, ...]) -> None:
+        self._config = config
+        self._cameras = cameras
+
+    def rendered(self, scene: ClutterScene, objects: Mapping[str, CatalogueObject]) -> ClutterScene:
+        """The same scene with its views."""
+        views = tuple(
+            ray_view(scene, objects, self._config.table_side_m, camera) for camera in self._cameras
+        )
+        return replace(scene, views=views)
+
+
+def new_renderer(config: ScenesConfig, cameras: tuple[PinholeCamera, ...]) -> SceneRenderer:
+    """SAPIEN's renderer where a driver is, Embree's with a notice where none is."""
+    try:
+        return SapienRenderer(config, cameras)
+    except MachineError as error:
+        logger.warning("rendering with Embree rays instead of SAPIEN: {}", error)
+        return RayRenderer(config, cameras)
