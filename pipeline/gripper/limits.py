@@ -6,6 +6,8 @@ import numpy as np
 from jaxtyping import Float
 
 WRENCH_AXES = ("F_x", "F_y", "F_z", "T_z")
+LIMIT_NAMES = tuple(f"{axis} {side}" for side in ("upper", "lower") for axis in WRENCH_AXES)
+"""What each column of `limit_slacks` is the room to."""
 
 
 def wrench_limit_ratios(

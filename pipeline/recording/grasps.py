@@ -140,9 +140,9 @@ def _show_figures(
     stream.log("curves/label/q", rr.Scalars(quality))
     stream.log("curves/label/p", rr.Scalars(pressure))
     slack = grasps.limit_slack[row]
-    # Slacks come in pairs, upper and lower: their sum is the width of the limit.
-    width = np.maximum(slack[0::2] + slack[1::2], 1e-12)
-    used = 1.0 - 2.0 * np.minimum(slack[0::2], slack[1::2]) / width
+    upper, lower = slack[:4], slack[4:]
+    width = np.maximum(upper + lower, 1e-12)
+    used = 1.0 - 2.0 * np.minimum(upper, lower) / width
     stream.log("curves/limits", rr.BarChart(used))
     wrench = ", ".join(f"{value:+.3f}" for value in grasps.wrench[row])
     stream.log(
