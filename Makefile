@@ -38,7 +38,7 @@ dataset: $(R)/shards.mcap  ## objects, scenes, grasps, shards
 train: $(R)/train.mcap  ## GA-CNN on the dataset
 	@$(PY) -m stages.graph fresh train
 eval: $(R)/evaluate.mcap  ## closed-loop success by level
-	@$(PY) -m stages.evaluate --run $(RUN) --table
+	@$(PY) -m stages.evaluate --table
 
 objects: $(R)/objects.mcap  ## stage 1: meshes to catalogue
 scenes: $(R)/scenes.mcap  ## stage 2: clutter, settled and rendered

@@ -41,6 +41,7 @@ from pipeline.geometry.table import table_mesh
 from pipeline.gripper import GraspStatus, LabelBatch, Pad, build_pad, label_batch
 from pipeline.gripper.balancing import flattened, quality_histogram, rare_grasps
 from pipeline.gripper.draping import drape
+from pipeline.gripper.heights import pad_heights
 from pipeline.gripper.limits import LIMIT_NAMES
 from pipeline.gripper.sampling import (
     Candidates,
@@ -285,26 +286,6 @@ def label_candidates(
         on_target = body_ids[below] == candidates.body_id[start : start + ROUND, None]
         parts.append(label_batch(pad, config.gripper, heights, on_target & (below >= 0)))
     return LabelBatch.joined(parts)
-
-
-def pad_heights(
-    world_from_contact: Float[np.ndarray, "n 4 4"], rays: RayScene, pad: Pad, clearance_m: float
-) -> tuple[Float[np.ndarray, "n v"], Int[np.ndarray, "n v"]]:
-    """z_s(v): height of the scene under each pad vertex above the contact, and what body it is.
-
-    Rays go down the approach from ``clearance_m`` above the contact; -inf and -1 where
-    nothing is hit.
-    """
-    count, vertices = len(world_from_contact), len(pad.vertices_xy_m)
-    above = np.column_stack([pad.vertices_xy_m, np.full(vertices, clearance_m)])
-    rotation = world_from_contact[:, :3, :3]
-    origins = above @ rotation.transpose(0, 2, 1) + world_from_contact[:, None, :3, 3]
-    down = np.repeat(-rotation[:, :, 2], vertices, axis=0)
-    hits = rays.cast(origins.reshape(-1, 3), down)
-    return (
-        (clearance_m - hits.distance_m).reshape(count, vertices),
-        hits.body.reshape(count, vertices),
-    )
 
 
 def visible_surface(view: CameraView, rays: RayScene, body_ids: np.ndarray) -> VisibleSurface:

@@ -9,6 +9,7 @@ import importlib.metadata
 import os
 import tempfile
 import zipfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -23,7 +24,7 @@ from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.shape import volume
 
 # PhysX cooks convex meshes of up to 255 vertices; fewer make contacts cheaper.
-_MOST_VERTICES = 200
+_MOST_VERTICES = 120
 # A mesh that fills this share of its convex hull is its own only part.
 _CONVEX_SHARE = 0.995
 _SEED = 0
@@ -31,13 +32,13 @@ _SEED = 0
 _LEAST_COVERAGE = 0.9
 _MOST_DECIMATION_SHARE = 0.02
 # Part of the cache key: raise it when what is computed from equal inputs changes.
-_METHOD_VERSION = 1
+_METHOD_VERSION = 4
 
 
 def convex_parts(mesh: Mesh, config: ConvexPartsConfig, cache_dir: Path) -> tuple[Mesh, ...]:
     """Closed convex meshes that together cover a closed mesh, in its frame.
 
-    At most config.max_parts parts of at most 200 vertices each; deterministic. Results are kept
+    At most config.max_parts parts of at most 120 vertices each; deterministic. Results are kept
     in cache_dir by a digest of mesh, parameters and CoACD's version; a damaged entry is
     recomputed.
     """
@@ -63,7 +64,7 @@ def decompose(mesh: Mesh, config: ConvexPartsConfig) -> tuple[Mesh, ...]:
     parts = _run_coacd(coarse, config, "off")
     if sum(volume(part) for part in parts) < _LEAST_COVERAGE * volume(mesh):
         parts = _run_coacd(coarse, config, "on")
-    return parts
+    return tuple(_within_limit(part) for part in covering(parts, mesh.vertices_m))
 
 
 def _run_coacd(
@@ -82,7 +83,33 @@ def _run_coacd(
         seed=_SEED,
     )
     hulls = [convex_hull(np.asarray(vertices, dtype=np.float64)) for vertices, _ in raw]
-    return tuple(_within_limit(part) for part in hulls)
+    return tuple(hulls)
+
+
+def covering(parts: Sequence[Mesh], vertices_m: Float[np.ndarray, "n 3"]) -> list[Mesh]:
+    """The parts, grown so that every vertex of the true surface lies in one of them.
+
+    CoACD works on a coarser surface: without this, objects would sink into what they rest on.
+    Each vertex goes to the part it lies least outside of, and that part's hull takes it in.
+    """
+    outside = np.stack([_outside_of(part, vertices_m) for part in parts], axis=1)
+    owner = np.argmin(outside, axis=1)
+    missing = outside[np.arange(len(vertices_m)), owner] > 0.0
+    return [
+        convex_hull(np.concatenate([part.vertices_m, vertices_m[missing & (owner == index)]]))
+        for index, part in enumerate(parts)
+    ]
+
+
+def _outside_of(part: Mesh, points_m: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, " n"]:
+    """How far each point lies beyond the farthest face plane of a convex part; below 0 inside."""
+    a, b, c = (part.vertices_m[part.faces[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(normals, axis=1)
+    solid = lengths > 0
+    normals = normals[solid] / lengths[solid, None]
+    offsets = np.einsum("ij,ij->i", normals, a[solid])
+    return np.asarray((points_m @ normals.T - offsets).max(axis=1))
 
 
 def convex_hull(points_m: Float[np.ndarray, "n 3"]) -> Mesh:
@@ -127,17 +154,25 @@ def cache_key(mesh: Mesh, config: ConvexPartsConfig) -> str:
 
 
 def _within_limit(hull: Mesh) -> Mesh:
-    """A hull of at most 200 vertices: the ones farthest from each other, chosen greedily."""
-    points = hull.vertices_m
-    if len(points) <= _MOST_VERTICES:
+    """A hull of at most 120 vertices, so of fewer than the 255 faces PhysX takes.
+
+    Kept are the support points of directions spread over the sphere; half of what the hull then
+    lacks is made up by growing it, so that it errs to both sides alike.
+    """
+    if len(hull.vertices_m) <= _MOST_VERTICES:
         return hull
-    first = int(np.argmax(np.linalg.norm(points - points.mean(axis=0), axis=1)))
-    chosen = [first]
-    distance = np.linalg.norm(points - points[first], axis=1)
-    while len(chosen) < _MOST_VERTICES:
-        chosen.append(int(np.argmax(distance)))
-        distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
-    return convex_hull(points[np.sort(chosen)])
+    index = np.arange(_MOST_VERTICES) + 0.5
+    height, turn = 1.0 - 2.0 * index / _MOST_VERTICES, np.pi * (1.0 + 5.0**0.5) * index
+    ring = np.sqrt(1.0 - height**2)
+    directions = np.stack([ring * np.cos(turn), ring * np.sin(turn), height], axis=1)
+    kept = convex_hull(
+        hull.vertices_m[np.unique(np.argmax(directions @ hull.vertices_m.T, axis=1))]
+    )
+    lacking = max(float(_outside_of(kept, hull.vertices_m).max()), 0.0)
+    centre = kept.vertices_m.mean(axis=0)
+    reach = float(np.linalg.norm(kept.vertices_m - centre, axis=1).mean())
+    grown = centre + (kept.vertices_m - centre) * (1.0 + 0.5 * lacking / reach)
+    return Mesh(grown, kept.faces)
 
 
 def _read(entry: Path) -> tuple[Mesh, ...] | None:

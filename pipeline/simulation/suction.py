@@ -1,0 +1,68 @@
+"""What a sealed pad can hold, in newtons: Eq. (7)-(11) at a named vacuum.
+
+Eq. (7) gives the vacuum force, Eq. (8)-(11) what friction bears along and about the surface.
+The supplement ignores moments about x and y (A-3); a lifted object has weight, so they are
+bounded here by the vacuum force at the lever r_v: the pad peels when its rim unloads.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from pipeline.config.evaluation import SuctionConfig
+from pipeline.config.grasps import GripperConfig
+from pipeline.gripper.contact import contact_of
+from pipeline.gripper.draping import contact_vertices, drape
+from pipeline.gripper.pad import Pad
+from pipeline.gripper.wrench import vacuum_force
+
+
+@dataclass(frozen=True)
+class Holding:
+    """Limits of a seal: pull and side forces [N], torsion and peel moments [N m], p of Eq. (2)."""
+
+    pressure: float
+    pull_n: float
+    side_n: float
+    torsion_nm: float
+    peel_nm: float
+
+
+def holding(
+    pad: Pad,
+    heights_m: Float[np.ndarray, " vertices"],
+    on_target: Bool[np.ndarray, " vertices"],
+    gripper: GripperConfig,
+    suction: SuctionConfig,
+) -> Holding:
+    """Limits of the pad draped on the heights under it."""
+    draped = drape(pad, heights_m[None])[0]
+    contact = contact_of(pad, draped, contact_vertices(pad, draped, heights_m, on_target))
+    if not contact.triangles.size:
+        return Holding(0.0, 0.0, 0.0, 0.0, 0.0)
+    force_n = suction.vacuum_pa * pad.area_m2 * vacuum_force(pad, contact)  # Eq. (7)
+    side_n = math.sqrt(3) / 3 * gripper.friction * force_n  # Eq. (8), (9)
+    return Holding(
+        pressure=contact.pressure,
+        pull_n=force_n,  # Eq. (10)
+        side_n=side_n,
+        torsion_nm=side_n * pad.radius_m,  # Eq. (11)
+        peel_nm=force_n * gripper.pad.seal_radius_m,
+    )
+
+
+def breaks(limits: Holding, load: Float[np.ndarray, " 6"]) -> bool:
+    """Whether a load is more than the seal holds.
+
+    load : force [N] and moment [N m] that the object exerts on the pad, in GCS; a pull
+    away from the pad is along -z.
+    """
+    pull = max(-float(load[2]), 0.0)
+    return (
+        pull > limits.pull_n
+        or bool(np.abs(load[:2]).max() > limits.side_n)
+        or abs(float(load[5])) > limits.torsion_nm
+        or float(np.hypot(load[3], load[4])) > limits.peel_nm
+    )
