@@ -8,11 +8,13 @@ from jaxtyping import Float
 
 from pipeline.clutter.settling import settle
 from pipeline.config.scenes import ScenesConfig
+from pipeline.errors import SceneError
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.transforms import random_rotation
 from pipeline.simulation.engine import Body, add_body, add_wall, new_world, sapien_pose
 
 _CLEARANCE_M = 0.005  # above what is below, when let go
+_TRIES_ALONE = 8
 _WALL_M = 0.02
 # The column that a pile is dropped into is this much wider than its longest object.
 _COLUMN_WIDTH = 1.5
@@ -26,15 +28,20 @@ def resting_pose(
 
     Raises
     ------
-    SceneError : it never came to rest.
+    SceneError : it never came to rest, in several tries.
     """
-    world = new_world(config, render=False)
-    pose = np.eye(4)
-    pose[:3, :3] = random_rotation(rng)
-    pose[2, 3] = _height_to_clear(item, pose[:3, :3])
-    body = add_body(world, item, pose, 1, _INVISIBLE, config)
-    settle(world, [body], config)
-    return body.world_from_object
+    for _ in range(_TRIES_ALONE):
+        world = new_world(config, render=False)
+        pose = np.eye(4)
+        pose[:3, :3] = random_rotation(rng)
+        pose[2, 3] = _height_to_clear(item, pose[:3, :3])
+        body = add_body(world, item, pose, 1, _INVISIBLE, config)
+        try:
+            settle(world, [body], config)
+        except SceneError:
+            continue  # rolled off, or rocks for long: another orientation
+        return body.world_from_object
+    raise SceneError(f"{item.name} never comes to rest on the table", "Leave this mesh out")
 
 
 def pile(

@@ -1,4 +1,4 @@
-"""Until everything rests: physics runs until speeds stay under their bounds, never a fixed count."""
+"""Until everything rests: physics runs until speeds stay low, never for a fixed count."""
 
 from collections.abc import Sequence
 

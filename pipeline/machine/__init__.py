@@ -1,1 +1,1 @@
-"""What this machine offers and lacks. Standard library only: it runs before anything is installed."""
+"""What this machine offers and lacks; standard library only, for it runs before all else."""

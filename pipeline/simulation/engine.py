@@ -32,7 +32,7 @@ _VELOCITY_ITERATIONS = 2
 # Interpenetration is undone gently: the default bound lets pushed-apart bodies jump.
 _DEPENETRATION_M_S = 0.5
 # Stands in for rolling resistance, which PhysX lacks: without it a ball rolls off any table.
-_ROLLING_DAMPING_1_S = 1.0
+_ROLLING_DAMPING_1_S = 3.0
 
 
 @dataclass(frozen=True, eq=False)

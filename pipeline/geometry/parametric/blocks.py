@@ -82,7 +82,9 @@ def egg() -> Solid:
     """A body of revolution, blunter below."""
     angle = np.linspace(-math.pi / 2, math.pi / 2, 40)
     radius = 0.024 * np.cos(angle) * (1 - 0.12 * np.sin(angle))
-    return revolve([*zip(np.maximum(radius, 0).tolist(), (0.031 * np.sin(angle)).tolist())])
+    return revolve(
+        [*zip(np.maximum(radius, 0).tolist(), (0.031 * np.sin(angle)).tolist(), strict=False)]
+    )
 
 
 def apple() -> Solid:
@@ -90,7 +92,7 @@ def apple() -> Solid:
     angle = np.linspace(-math.pi / 2, math.pi / 2, 48)
     radius = 0.038 * np.cos(angle) ** 0.8
     height = 0.034 * np.sin(angle) - 0.012 * np.exp(-((radius / 0.012) ** 2)) * np.sign(angle)
-    body = revolve([*zip(radius.tolist(), height.tolist())])
+    body = revolve([*zip(radius.tolist(), height.tolist(), strict=False)])
     return body + rod((0, 0, 0.018), (0.004, 0, 0.036), 0.0020, 12)
 
 
@@ -100,7 +102,7 @@ def lemon() -> Solid:
     radius = 0.027 * np.sqrt(np.maximum(1 - (height / 0.86) ** 2, 0)) + 0.0050 * np.sqrt(
         np.maximum(1 - height**2, 0)
     )
-    return revolve([*zip(radius.tolist(), (0.042 * height).tolist())])
+    return revolve([*zip(radius.tolist(), (0.042 * height).tolist(), strict=True)])
 
 
 def soup_can() -> Solid:
