@@ -224,7 +224,7 @@ def grasps_of_view(
         limit_slack=labels.slacks,
         weight_summary=labels.weights,
         contact_mask=labels.contact,
-        status=labels.status,
+        status=labels.status - min(GraspStatus),
         iterations=labels.iterations,
         tilt_rad=candidates.tilt_rad,
         proposal=candidates.proposal,

@@ -69,7 +69,7 @@ def build_clutter(
             views=(),
         )
     raise SceneError(
-        f"{scene_id}: no clutter of level {level} in {config.placement_attempts} attempts: {reason}",
+        f"{scene_id}: no clutter of level {level} in {config.placement_attempts} tries: {reason}",
         "Raise scenes.placement_attempts, or lower scenes.objects_per_clutter",
     )
 

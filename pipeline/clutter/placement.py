@@ -172,7 +172,8 @@ def _outside(
         for bound in bounds_of(surface.mesh, pose)
     )
     own = float(np.linalg.norm(surfaces[-1].mesh.extents_m))
-    return (np.sqrt(2) * reach + own) * np.array([np.cos(azimuth_rad), np.sin(azimuth_rad)])
+    clear = np.sqrt(2) * reach + own
+    return np.array([clear * np.cos(azimuth_rad), clear * np.sin(azimuth_rad)])
 
 
 def _gap_at_least(

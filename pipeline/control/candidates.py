@@ -18,7 +18,8 @@ _FEWEST_POINTS = 6  # a plane through fewer is no surface
 def above_table(points_m: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "m 3"]:
     """Finite points that cannot be the table's."""
     finite = np.isfinite(points_m).all(axis=1)
-    return points_m[finite & (np.nan_to_num(points_m[:, 2]) > TABLE_CLEARANCE_M)]
+    kept = finite & (np.nan_to_num(points_m[:, 2]) > TABLE_CLEARANCE_M)
+    return np.asarray(points_m[kept])
 
 
 def sample_candidates(

@@ -62,7 +62,7 @@ class Scorer(Protocol):
     """q-hat of every candidate, in one batch."""
 
     def __call__(
-        self, observation: Observation, world_from_contact: Float[np.ndarray, "k 4 4"]
+        self, observation: Observation, world_from_contact: Float[np.ndarray, "k 4 4"], /
     ) -> Float[np.ndarray, " k"]: ...
 
 

@@ -70,7 +70,8 @@ def incidence_rad(view: CameraView) -> Float[np.ndarray, "h w"]:
     along = depth + x[None, :] * slope_x + y[:, None] * slope_y
     normal = np.sqrt(slope_x**2 + slope_y**2 + along**2)
     ray = np.sqrt(1.0 + x[None, :] ** 2 + y[:, None] ** 2)
-    return np.arccos(np.clip(depth / np.maximum(normal * ray, 1e-12), 0.0, 1.0))
+    cosine = np.clip(depth / np.maximum(normal * ray, 1e-12), 0.0, 1.0)
+    return np.asarray(np.arccos(cosine))
 
 
 def _edges(depth: Float[np.ndarray, "h w"], step_m: float) -> np.ndarray:

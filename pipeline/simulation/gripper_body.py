@@ -208,7 +208,7 @@ class FloatingGripper:
         for contact in self._world.get_contacts():
             if any(body.entity == self._entity for body in contact.bodies):
                 impulse += sum(float(np.linalg.norm(point.impulse)) for point in contact.points)
-        return impulse / self._world.timestep <= limit_n
+        return bool(impulse / self._world.timestep <= limit_n)
 
     def _holding_on(self) -> bool:
         return self._grip is not None

@@ -67,12 +67,10 @@ def test_a_failing_writer_leaves_what_stood_there(tmp_path: Path, provenance: Pr
 
 
 def test_a_topic_keeps_its_type(tmp_path: Path, provenance: Provenance) -> None:
-    with (
-        pytest.raises(ArtifactError, match=r"carries softgrip.v1.CatalogueObject.*RefusedMesh"),
-        ArtifactWriter(tmp_path / "x.mcap", provenance) as artifact,
-    ):
+    with ArtifactWriter(tmp_path / "x.mcap", provenance) as artifact:
         artifact.write("/objects", CatalogueObject(), log_time_ns=0)
-        artifact.write("/objects", RefusedMesh(), log_time_ns=1)
+        with pytest.raises(ArtifactError, match=r"carries softgrip.v1.Catalogue.*RefusedMesh"):
+            artifact.write("/objects", RefusedMesh(), log_time_ns=1)
 
 
 @pytest.mark.parametrize("kept", [0.0, 0.1, 0.5, 0.9, 0.99])

@@ -182,7 +182,7 @@ def bumpy(seed: int, pad: Pad) -> np.ndarray:
     heights = a[0] * x + a[1] * y + a[2] * x * y - abs(a[3]) * x**2 - abs(a[4]) * y**2
     heights = heights + a[5] * np.sin(5 * x + 3 * y)
     heights[x * rng.normal() + y * rng.normal() > 0.4 + rng.random()] = -np.inf
-    return heights
+    return np.asarray(heights)
 
 
 def turned(heights: np.ndarray, pad: Pad, sectors: int) -> np.ndarray:

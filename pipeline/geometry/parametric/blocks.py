@@ -82,9 +82,8 @@ def egg() -> Solid:
     """A body of revolution, blunter below."""
     angle = np.linspace(-math.pi / 2, math.pi / 2, 40)
     radius = 0.024 * np.cos(angle) * (1 - 0.12 * np.sin(angle))
-    return revolve(
-        [*zip(np.maximum(radius, 0).tolist(), (0.031 * np.sin(angle)).tolist(), strict=False)]
-    )
+    outline = zip(np.maximum(radius, 0).tolist(), (0.031 * np.sin(angle)).tolist(), strict=True)
+    return revolve([*outline])
 
 
 def apple() -> Solid:

@@ -5,13 +5,14 @@ Every object is built in a pose in which z is up and its size is near that of th
 
 import math
 from collections.abc import Sequence
+from typing import TypeAlias
 
 import manifold3d
 import numpy as np
 from jaxtyping import Float
 
-Solid = manifold3d.Manifold
-Section = manifold3d.CrossSection
+Solid: TypeAlias = manifold3d.Manifold
+Section: TypeAlias = manifold3d.CrossSection
 Outline = Sequence[tuple[float, float]]
 
 # Segments of a full circle, and of one that is small in its object.

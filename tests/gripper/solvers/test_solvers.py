@@ -170,7 +170,10 @@ def test_a_plane_is_a_perfect_seal_to_every_solver(name: str) -> None:
     (problem,) = from_heights(np.zeros((1, 586)))
     solution = SOLVERS[name](problem)  # type: ignore[index]
     assert solution.status is GraspStatus.SOLVED
-    assert quality_of(problem, solution) == pytest.approx(1.0, abs=1e-6)
+    # q has a norm's corner at a perfect seal: an objective off by Clarabel's smallest reachable
+    # gap of 1e-12 is a norm off by 1e-6 s, where the other solvers polish.
+    tolerance = 2e-5 if name == "clarabel" else 1e-6
+    assert quality_of(problem, solution) == pytest.approx(1.0, abs=tolerance)
 
 
 def test_too_few_iterations_are_reported() -> None:
