@@ -91,7 +91,7 @@ def apple() -> Solid:
     angle = np.linspace(-math.pi / 2, math.pi / 2, 48)
     radius = 0.038 * np.cos(angle) ** 0.8
     height = 0.034 * np.sin(angle) - 0.012 * np.exp(-((radius / 0.012) ** 2)) * np.sign(angle)
-    body = revolve(list(zip(radius.tolist(), height.tolist(), strict=False, strict=True)))
+    body = revolve([*zip(radius.tolist(), height.tolist(), strict=False)])
     return body + rod((0, 0, 0.018), (0.004, 0, 0.036), 0.0020, 12)
 
 
@@ -101,7 +101,7 @@ def lemon() -> Solid:
     radius = 0.027 * np.sqrt(np.maximum(1 - (height / 0.86) ** 2, 0)) + 0.0050 * np.sqrt(
         np.maximum(1 - height**2, 0)
     )
-    return revolve(list(zip(radius.tolist(), (0.042 * height).tolist(), strict=True, strict=True)))
+    return revolve([*zip(radius.tolist(), (0.042 * height).tolist(), strict=True)])
 
 
 def soup_can() -> Solid:
