@@ -127,6 +127,7 @@ def test_real_problems_have_one_answer() -> None:
     problems = from_heights(heights_on_meshes(mesh_folder(), 45))
     assert len(problems) >= 2000
     verdicts = []
+    dense: list[tuple[QualityProblem, QpSolution, QpSolution]] = []
     for index, problem in enumerate(problems):
         ours = SOLVERS["structured"](problem)
         verdicts.append(ours.status)
@@ -138,7 +139,14 @@ def test_real_problems_have_one_answer() -> None:
         if index % 5 == 0:
             assert_one_answer(problem, ours, SOLVERS["clarabel"])
         if index % 100 == 0:
-            assert_one_answer(problem, ours, SOLVERS["piqp-dense"])
+            dense.append((problem, ours, SOLVERS["piqp-dense"](problem)))
+    # In the dense form PIQP may circle its optimum up to the cap at weak grasps, whose G is
+    # all but 0: it then gives no verdict, but the same q.
+    for problem, ours, theirs in dense:
+        assert theirs.status in (ours.status, GraspStatus.MAX_ITERATIONS)
+        assert quality_of(problem, ours) == pytest.approx(quality_of(problem, theirs), abs=1e-6)
+    capped = sum(theirs.status is GraspStatus.MAX_ITERATIONS for _, _, theirs in dense)
+    assert capped <= 0.2 * len(dense)
     assert min(verdicts.count(GraspStatus.SOLVED), verdicts.count(GraspStatus.INFEASIBLE)) > 200
 
 
