@@ -13,7 +13,7 @@ from pipeline.artifacts.evaluation_messages import attempt_message
 from pipeline.artifacts.object_messages import read_objects
 from pipeline.artifacts.scene_messages import read_scenes
 from pipeline.artifacts.sharding import is_current
-from pipeline.artifacts.training_messages import read_checkpoint
+from pipeline.artifacts.training_messages import read_export
 from pipeline.clutter.scene import ClutterScene
 from pipeline.config import RunConfig
 from pipeline.control.success import success_rate
@@ -28,9 +28,7 @@ from pipeline.execution import (
     stage_command,
 )
 from pipeline.geometry.catalogue import CatalogueObject
-from pipeline.network.checkpoint import load_checkpoint_bytes
-from pipeline.network.ga_cnn import GaCnn
-from pipeline.network.inference import predict
+from pipeline.network.export import OnnxPredictor
 from pipeline.recording.evaluate import blueprint, show_attempts
 from pipeline.recording.recording import recording, spread
 from pipeline.sensing.cameras import cameras_of
@@ -40,6 +38,7 @@ from schemas.softgrip.v1.evaluation_pb2 import Attempt, LevelResult
 from stages.graph import EVALUATE, RUNS_DIR, inputs_of
 
 SCORE_BATCH = 64
+SCORE_THREADS = 1  # clutters run side by side, a worker a core
 
 
 @dataclass(frozen=True)
@@ -102,13 +101,7 @@ def pick_clutter(job: ClutterJob) -> Path:
         return job.path
     objects = {name: item for name, (item, _) in catalogue(job.objects).items()}
     config = job.config
-    score = partial(
-        predict,
-        network(job.checkpoint),
-        batch_size=SCORE_BATCH,
-        threads=config.train.threads,
-        average_symmetries=False,
-    )
+    score = partial(network(job.checkpoint).predict, batch_size=SCORE_BATCH)
     rng = generator(config.seed, "evaluate", job.scene.scene_id)
     made = run_clutter(job.scene, objects, renderer_of(config), score, config, rng)
     with ArtifactWriter(job.path, job.provenance) as artifact:
@@ -125,9 +118,9 @@ def catalogue(objects: Path) -> dict[str, tuple[CatalogueObject, str]]:
 
 
 @lru_cache(maxsize=1)
-def network(checkpoint: Path) -> GaCnn:
-    """The trained network, read once a worker."""
-    return load_checkpoint_bytes(read_checkpoint(checkpoint))
+def network(checkpoint: Path) -> OnnxPredictor:
+    """The trained network as exported for control, read once a worker."""
+    return OnnxPredictor(read_export(checkpoint), SCORE_THREADS)
 
 
 @lru_cache(maxsize=1)

@@ -7,6 +7,7 @@ from pipeline.artifacts import ArtifactWriter, publish_bytes
 from pipeline.artifacts.sample_messages import Samples
 from pipeline.artifacts.training_messages import (
     CHECKPOINT,
+    EXPORT,
     TestFigures,
     epoch_message,
     result_message,
@@ -14,6 +15,7 @@ from pipeline.artifacts.training_messages import (
 from pipeline.execution import StageContext, Summary, stage_command
 from pipeline.network.baselines import fit_monotone, mean_predictor_mae, seal_ratio
 from pipeline.network.checkpoint import save_checkpoint_bytes
+from pipeline.network.export import OnnxPredictor, checked_against, export_onnx_bytes
 from pipeline.network.figures import (
     calibration,
     error_by_class,
@@ -28,6 +30,7 @@ from pipeline.recording.train import blueprint, show_training
 from stages.graph import TRAIN, inputs_of
 from stages.shards import read_split
 
+COMPARED = 512  # test clouds on which the export for control is held against its original
 CLASSES = np.array(["basic", "typical", "complex"])
 
 
@@ -103,9 +106,11 @@ def test_figures(
 def publish(
     stage: StageContext, trained: TrainedNetwork, figures: TestFigures, test_set: Samples
 ) -> None:
-    """Recording, the checkpoint on its own, and the artifact that carries both figures and it."""
+    """Recording, the weights on their own, and the artifact that carries both figures and them."""
     checkpoint = save_checkpoint_bytes(trained.network)
+    exported = export_for_control(stage, trained, test_set)
     publish_bytes(stage.folder.path / "train" / CHECKPOINT, checkpoint)
+    publish_bytes(stage.folder.path / "train" / EXPORT, exported)
     wanted = stage.config.recording.clouds
     with recording(stage.recording, stage.stage.name, stage.key.digest, blueprint()) as stream:
         show_training(stream, trained.history, figures, test_set, wanted)
@@ -115,6 +120,23 @@ def publish(
         result = result_message(trained, figures)
         artifact.write("/result", result, log_time_ns=len(trained.history))
         artifact.attach(CHECKPOINT, "application/octet-stream", checkpoint)
+        artifact.attach(EXPORT, "application/octet-stream", exported)
+
+
+def export_for_control(stage: StageContext, trained: TrainedNetwork, test_set: Samples) -> bytes:
+    """The network as ONNX, held against the original on test clouds."""
+    exported = export_onnx_bytes(trained.network)
+    config = stage.config.train
+    difference = checked_against(
+        OnnxPredictor(exported, config.threads),
+        trained.network,
+        test_set.cloud[:COMPARED],
+        test_set.cloud_mask[:COMPARED],
+        config.batch_size,
+        config.threads,
+    )
+    logger.info("train: exported for control, largest difference {:.1e}", difference)
+    return exported
 
 
 def summary(stage: StageContext, trained: TrainedNetwork, figures: TestFigures) -> Summary:

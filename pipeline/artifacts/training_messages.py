@@ -14,6 +14,7 @@ from pipeline.network.training import EpochMetrics, TrainedNetwork
 from schemas.softgrip.v1.training_pb2 import Epoch, TrainingResult
 
 CHECKPOINT = "ga_cnn.safetensors"
+EXPORT = "ga_cnn.onnx"
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,12 @@ def read_checkpoint(path: Path) -> bytes:
     """The checkpoint attached to a train artifact."""
     with open_artifact(path) as artifact:
         return artifact.attachment(CHECKPOINT)
+
+
+def read_export(path: Path) -> bytes:
+    """The network exported for control, attached to a train artifact."""
+    with open_artifact(path) as artifact:
+        return artifact.attachment(EXPORT)
 
 
 def _numbers(values: Sequence[float | None]) -> Float[np.ndarray, " n"]:

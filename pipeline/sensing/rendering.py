@@ -12,8 +12,7 @@ from pipeline.errors import MachineError
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.sensing.cameras import PinholeCamera
 from pipeline.sensing.ray_rendering import ray_view
-from pipeline.sensing.sapien_rendering import sapien_views
-from pipeline.simulation.vulkan import new_render_system
+from pipeline.sensing.sapien_rendering import SapienRenderer
 
 
 class SceneRenderer(Protocol):
@@ -24,21 +23,6 @@ class SceneRenderer(Protocol):
     def rendered(self, scene: ClutterScene, objects: Mapping[str, CatalogueObject]) -> ClutterScene:
         """The same scene with its views."""
         ...
-
-
-class SapienRenderer:
-    """SAPIEN's rasteriser on a GPU or on lavapipe."""
-
-    name = "sapien"
-
-    def __init__(self, config: ScenesConfig, cameras: tuple[PinholeCamera, ...]) -> None:
-        new_render_system()  # fails here, with a remedy, where nothing can render
-        self._config = config
-        self._cameras = cameras
-
-    def rendered(self, scene: ClutterScene, objects: Mapping[str, CatalogueObject]) -> ClutterScene:
-        """The same scene with its views."""
-        return replace(scene, views=sapien_views(scene, objects, self._config, self._cameras))
 
 
 class RayRenderer:

@@ -16,7 +16,8 @@ from pipeline.geometry.mesh_files import MeshSource
 from pipeline.geometry.shape import nsvr, shape_class
 from pipeline.sensing.cameras import cameras_of, points_of_depth
 from pipeline.sensing.depth_noise import disturb
-from pipeline.sensing.rendering import RayRenderer, SapienRenderer
+from pipeline.sensing.rendering import RayRenderer
+from pipeline.sensing.sapien_rendering import SapienRenderer
 from pipeline.sensing.sub_cloud import sub_clouds
 from pipeline.sensing.view import CameraView
 
