@@ -32,7 +32,7 @@ _SEED = 0
 _LEAST_COVERAGE = 0.9
 _MOST_DECIMATION_SHARE = 0.02
 # Part of the cache key: raise it when what is computed from equal inputs changes.
-_METHOD_VERSION = 4
+_METHOD_VERSION = 5
 
 
 def convex_parts(mesh: Mesh, config: ConvexPartsConfig, cache_dir: Path) -> tuple[Mesh, ...]:
@@ -80,6 +80,8 @@ def _run_coacd(
         preprocess_mode=preprocess,
         resolution=config.resolution,
         mcts_iterations=config.search_iterations,
+        mcts_nodes=config.search_nodes,
+        preprocess_resolution=config.preprocess_resolution,
         seed=_SEED,
     )
     hulls = [convex_hull(np.asarray(vertices, dtype=np.float64)) for vertices, _ in raw]

@@ -14,7 +14,7 @@ import trimesh
 from pipeline.config.objects import ObjectsConfig
 from pipeline.errors import MeshError
 from pipeline.geometry.mesh import Mesh
-from pipeline.geometry.mesh_headers import check_header
+from pipeline.geometry.mesh_headers import check_header, check_off_faces
 
 MESH_SUFFIXES = (".glb", ".obj", ".off", ".ply", ".stl")
 UnitSource = Literal["declared", "configured", "detected"]
@@ -116,6 +116,8 @@ def load_mesh_file(path: Path, folder: Path, name: str, config: ObjectsConfig) -
     data = path.read_bytes()
     check_header(label, data, config.max_faces)
     raw, declared = parse_mesh(label, data)
+    if path.suffix.lower() == ".off":
+        check_off_faces(label, data, len(raw.faces))
     check_arrays(label, raw, config.max_faces)
     unit, known_by = length_unit(label, float(raw.extents_m.max()), declared, config)
     mesh = Mesh(raw.vertices_m * _METRES_PER_UNIT[unit], raw.faces)

@@ -72,14 +72,32 @@ def _stl(name: str, data: bytes, max_faces: int) -> None:
     _few_enough(name, count, max_faces)
 
 
-def _off(name: str, data: bytes, max_faces: int) -> None:
+def check_off_faces(name: str, data: bytes, parsed: int) -> None:
+    """Raise MeshError where fewer faces could be read than an OFF file declares.
+
+    A text file's least length does not tell a cut in its last lines; triangulating polygons
+    only adds faces.
+    """
+    _, declared = _off_counts(name, data)
+    if parsed < declared:
+        raise MeshError(
+            f"{name} is truncated: its header declares {declared} faces, {parsed} are there",
+            _EXPORT_AGAIN,
+        )
+
+
+def _off_counts(name: str, data: bytes) -> tuple[int, int]:
     lines = data[:_MOST_HEADER_BYTES].decode("utf-8", errors="replace").splitlines()
     words = [word for line in lines for word in line.split("#")[0].split()]
     if not words or not words[0].upper().endswith("OFF"):
         raise MeshError(f"{name} has no OFF header", _EXPORT_AGAIN)
     if len(words) < 3 or not (words[1].isdecimal() and words[2].isdecimal()):
         raise MeshError(f"{name} does not declare its vertices and faces", _EXPORT_AGAIN)
-    vertices, faces = int(words[1]), int(words[2])
+    return int(words[1]), int(words[2])
+
+
+def _off(name: str, data: bytes, max_faces: int) -> None:
+    vertices, faces = _off_counts(name, data)
     _few_enough(name, faces, max_faces)
     # "0 0 0\n" and "3 0 1 2\n" are the shortest lines.
     _long_enough(name, len(data) + 1, 6 * vertices + 8 * faces, ascii_body=True)

@@ -1,0 +1,77 @@
+"""Convex parts cover the body, stay within PhysX's limits, and are kept by content."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from pipeline.config import ObjectsConfig
+from pipeline.geometry.convex_parts import cache_key, convex_parts
+from pipeline.geometry.mesh import Mesh
+from pipeline.geometry.shape import volume
+from tests.bodies import mesh_of
+
+CONFIG = ObjectsConfig().convex
+
+
+def cross() -> Mesh:
+    """Two bars through each other."""
+    bars = [trimesh.creation.box(extents=e) for e in ((0.1, 0.02, 0.02), (0.02, 0.1, 0.02))]
+    return mesh_of(trimesh.boolean.union(bars, engine="manifold"))
+
+
+@pytest.fixture(scope="module")
+def cross_parts(tmp_path_factory: pytest.TempPathFactory) -> tuple[Mesh, ...]:
+    return convex_parts(cross(), CONFIG, tmp_path_factory.mktemp("cache"))
+
+
+def outside_m(part: Mesh, points: np.ndarray) -> np.ndarray:
+    a, b, c = (part.vertices_m[part.faces[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    lengths = np.linalg.norm(normals, axis=1)
+    solid = lengths > 0  # slivers of the hull have no plane
+    normals = normals[solid] / lengths[solid, None]
+    return np.asarray((points @ normals.T - np.einsum("ij,ij->i", normals, a[solid])).max(axis=1))
+
+
+def test_a_convex_body_is_its_own_hull(tmp_path: Path) -> None:
+    (part,) = convex_parts(mesh_of(trimesh.creation.box()), CONFIG, tmp_path)
+    assert volume(part) == pytest.approx(1.0)
+
+
+def test_a_hull_keeps_within_the_engine_s_limit(tmp_path: Path) -> None:
+    ball = mesh_of(trimesh.creation.icosphere(subdivisions=5))
+    (part,) = convex_parts(ball, CONFIG, tmp_path)
+    assert len(part.vertices_m) <= 120
+    assert volume(part) == pytest.approx(volume(ball), rel=0.05)
+
+
+def test_parts_of_a_cross_are_bars_and_cover_it(cross_parts: tuple[Mesh, ...]) -> None:
+    mesh = cross()
+    assert 2 <= len(cross_parts) <= CONFIG.max_parts
+    outside = np.min([outside_m(part, mesh.vertices_m) for part in cross_parts], axis=0)
+    assert outside.max() < 1e-6
+    hull = mesh_of(trimesh.Trimesh(mesh.vertices_m, mesh.faces).convex_hull)
+    total = sum(volume(part) for part in cross_parts)
+    assert total < 0.6 * volume(hull)
+    assert total == pytest.approx(volume(mesh), rel=0.2)
+
+
+def test_parts_are_kept_and_a_damaged_entry_is_made_again(tmp_path: Path) -> None:
+    mesh = cross()
+    first = convex_parts(mesh, CONFIG, tmp_path)
+    (entry,) = tmp_path.glob("*.npz")
+    assert entry.stem == cache_key(mesh, CONFIG)
+    kept = convex_parts(mesh, CONFIG, tmp_path)
+    assert [p.vertices_m.tobytes() for p in kept] == [p.vertices_m.tobytes() for p in first]
+    entry.write_bytes(entry.read_bytes()[:100])
+    again = convex_parts(mesh, CONFIG, tmp_path)
+    assert [p.vertices_m.tobytes() for p in again] == [p.vertices_m.tobytes() for p in first]
+
+
+def test_the_key_knows_mesh_and_settings() -> None:
+    mesh = cross()
+    moved = Mesh(mesh.vertices_m + 1e-12, mesh.faces)
+    coarser = CONFIG.model_copy(update={"concavity": 0.2})
+    assert len({cache_key(mesh, CONFIG), cache_key(moved, CONFIG), cache_key(mesh, coarser)}) == 3
