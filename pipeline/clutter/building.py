@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from pipeline.clutter.dropping import drop_again, pile, resting_pose
-from pipeline.clutter.gaps import Surface, pairwise_gaps_m, penetration_m
+from pipeline.clutter.gaps import Surface, nearest_gaps_m, pairwise_gaps_m, penetration_m
 from pipeline.clutter.levels import Distribution, level_of
 from pipeline.clutter.placement import place_isolated, place_multiple
 from pipeline.clutter.scene import ClutterScene, PlacedObject
@@ -60,7 +60,7 @@ def build_clutter(
                 PlacedObject(item.name, body_id, pose)
                 for body_id, (item, pose) in enumerate(zip(items, poses, strict=True), start=1)
             ),
-            gaps_m=gaps.min(axis=1),
+            gaps_m=nearest_gaps_m([Surface(item.mesh) for item in items], poses, gaps),
             contacts=tuple(
                 (int(i) + 1, int(j) + 1)
                 for i, j in np.argwhere(np.triu(gaps <= config.touch_gap_max_m, k=1))
@@ -88,7 +88,7 @@ def measured(
     distribution: Distribution,
     config: ScenesConfig,
 ) -> Float[np.ndarray, "n n"]:
-    """The gap of every pair on the true meshes, after holding the level's definition to it.
+    """Gaps on the true meshes, of far pairs a lower bound, held to the level's definition.
 
     Raises
     ------

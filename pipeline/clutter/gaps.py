@@ -73,6 +73,25 @@ def pairwise_gaps_m(
     return gaps
 
 
+def nearest_gaps_m(
+    surfaces: Sequence[Surface],
+    poses: Sequence[Float[np.ndarray, "4 4"]],
+    bounds_m: Float[np.ndarray, "n n"],
+) -> Float[np.ndarray, " n"]:
+    """Gap of each body to its nearest neighbour [m], measured; inf for a lone body.
+
+    bounds_m : lower bounds of the gaps, as of ``pairwise_gaps_m``: pairs whose bound exceeds a
+        gap already found are not measured.
+    """
+    nearest = np.full(len(surfaces), NO_NEIGHBOUR_M)
+    for i in range(len(surfaces)):
+        for j in np.argsort(bounds_m[i], kind="stable"):
+            if bounds_m[i, j] >= nearest[i]:
+                break
+            nearest[i] = min(nearest[i], gap_m(surfaces[i], poses[i], surfaces[j], poses[j]))
+    return nearest
+
+
 def bounds_of(
     mesh: Mesh, world_from_object: Float[np.ndarray, "4 4"]
 ) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]:

@@ -60,6 +60,16 @@ class Body:
         return float(np.linalg.norm(self.rigid.angular_velocity))
 
 
+def roll_freely(body: Body, free: bool) -> None:
+    """Take the stand-in for rolling resistance off a body that is carried, or put it back.
+
+    In the air it would be a drag, felt as a load that no object has.
+    """
+    damping = 0.0 if free else _ROLLING_DAMPING_1_S
+    body.rigid.linear_damping = damping
+    body.rigid.angular_damping = damping
+
+
 def new_world(config: ScenesConfig, render: bool) -> sapien.Scene:
     """An empty table under gravity; with lights and visuals where `render` is set.
 

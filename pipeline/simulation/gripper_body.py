@@ -21,7 +21,7 @@ from pipeline.geometry.transforms import invert
 from pipeline.gripper import label_batch
 from pipeline.gripper.heights import pad_heights
 from pipeline.gripper.pad import Pad
-from pipeline.simulation.engine import Body, sapien_pose
+from pipeline.simulation.engine import Body, roll_freely, sapien_pose
 from pipeline.simulation.suction import Holding, breaks, holding
 
 _STEM_RADIUS_M = 0.012
@@ -63,7 +63,7 @@ class FloatingGripper:
         parked[:3, 3] = _PARKED
         self._pose = parked
         self._entity.pose = sapien_pose(self._stem_pose())
-        self._grip = self._limits = None
+        self._let_go()
         self.target: int = 0
         self.reached_quality = self.seal_pressure = self.lifted_height_m = 0.0
         self.reached_pose = np.eye(4)
@@ -117,6 +117,7 @@ class FloatingGripper:
         self._limits = best
         self._grip = (body, invert(self._pose) @ body.world_from_object)
         self._lifted_from = float(body.world_from_object[2, 3])
+        roll_freely(body, free=True)
         body.rigid.wake_up()
         return True
 
@@ -197,9 +198,14 @@ class FloatingGripper:
             [into_gripper @ force, into_gripper @ (torque + np.cross(arm, force))]
         )
         if breaks(self._limits, self._load):
-            self._grip = None
+            self._let_go()
             return
         body.rigid.add_force_torque(force, torque)
+
+    def _let_go(self) -> None:
+        if self._grip is not None:
+            roll_freely(self._grip[0], free=False)
+        self._grip = self._limits = None
 
     def _uncollided(self) -> bool:
         """Whether the stem meets less force than the limit; what it holds does not count."""

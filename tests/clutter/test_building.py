@@ -1,0 +1,84 @@
+"""Clutters meet the definition of their level, measured again here from nothing but poses."""
+
+import itertools
+
+import numpy as np
+import pytest
+import trimesh
+
+from pipeline.clutter.building import build_clutter
+from pipeline.clutter.scene import ClutterScene
+from pipeline.config import ScenesConfig
+from pipeline.errors import SceneError
+from pipeline.geometry.catalogue import CatalogueObject
+from tests.bodies import catalogue_object
+
+CONFIG = ScenesConfig(objects_per_clutter=4)
+
+
+@pytest.fixture(scope="module")
+def pool(tmp_path_factory: pytest.TempPathFactory) -> list[CatalogueObject]:
+    cache = tmp_path_factory.mktemp("parts")
+    shapes = {
+        "box": trimesh.creation.box(extents=(0.08, 0.06, 0.04)),
+        "can": trimesh.creation.cylinder(radius=0.03, height=0.08, sections=48),
+        "block": trimesh.creation.box(extents=(0.05, 0.05, 0.05)),
+        "slab": trimesh.creation.box(extents=(0.1, 0.07, 0.02)),
+    }
+    return [catalogue_object(name, shape, cache) for name, shape in shapes.items()]
+
+
+def placed(scene: ClutterScene, pool: list[CatalogueObject]) -> list[trimesh.Trimesh]:
+    meshes = {item.name: item.mesh for item in pool}
+    moved = [meshes[p.object_name].transformed(p.world_from_object) for p in scene.objects]
+    return [trimesh.Trimesh(m.vertices_m, m.faces, process=False) for m in moved]
+
+
+def nearest_gaps_m(bodies: list[trimesh.Trimesh]) -> np.ndarray:
+    """Oracle: points sprinkled on one body, their distance to the other's surface."""
+    gaps = np.full((len(bodies), len(bodies)), np.inf)
+    for i, j in itertools.permutations(range(len(bodies)), 2):
+        points, _ = trimesh.sample.sample_surface(bodies[i], 6000, seed=1)
+        points = np.concatenate([points, bodies[i].vertices])
+        _, distance, _ = trimesh.proximity.closest_point(bodies[j], points)
+        gaps[i, j] = distance.min()
+    return np.asarray(np.minimum(gaps, gaps.T).min(axis=1))
+
+
+@pytest.mark.parametrize("level", [1, 2, 3])
+def test_a_clutter_is_what_its_level_says(level: int, pool: list[CatalogueObject]) -> None:
+    scene = build_clutter("s", level, "train", pool, CONFIG, seed=3)
+    assert sorted(p.object_name for p in scene.objects) == sorted(item.name for item in pool)
+    assert [p.body_id for p in scene.objects] == [1, 2, 3, 4]
+    bodies = placed(scene, pool)
+    gaps = nearest_gaps_m(bodies)
+    np.testing.assert_allclose(scene.gaps_m, gaps, atol=2e-3)
+    if level == 1:
+        assert gaps.min() >= 0.05 - 1e-6
+        assert scene.contacts == ()
+    elif level == 2:
+        assert gaps.max() <= 0.01 + 2e-3
+        assert scene.gaps_m.min() > 0
+    else:
+        assert scene.gaps_m.max() <= CONFIG.touch_gap_max_m
+        assert {i for pair in scene.contacts for i in pair} == {1, 2, 3, 4}
+        assert max(body.bounds[1, 2] for body in bodies) > 0.08
+    lowest = np.array([body.bounds[0, 2] for body in bodies])
+    assert lowest.min() >= -CONFIG.sink_max_m
+    if level != 3:
+        assert lowest.max() <= CONFIG.touch_gap_max_m
+
+
+def test_the_same_seed_gives_the_same_bits(pool: list[CatalogueObject]) -> None:
+    one, two, other = (build_clutter("s", 3, "train", pool, CONFIG, seed) for seed in (5, 5, 6))
+    poses = [np.array([p.world_from_object for p in s.objects]) for s in (one, two, other)]
+    assert poses[0].tobytes() == poses[1].tobytes()
+    assert poses[0].tobytes() != poses[2].tobytes()
+
+
+def test_a_level_that_cannot_be_met_is_an_error_not_a_scene(pool: list[CatalogueObject]) -> None:
+    crowded = ScenesConfig(
+        objects_per_clutter=12, workspace_side_m=0.2, table_side_m=0.3, placement_attempts=2
+    )
+    with pytest.raises(SceneError, match="no clutter of level 1 in 2 tries"):
+        build_clutter("s", 1, "train", pool, crowded, seed=0)

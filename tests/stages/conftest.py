@@ -1,0 +1,53 @@
+"""A run small enough for a test, through all six stages."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+TINY = """
+seed = 4
+[objects]
+limit = 12
+[objects.convex]
+input_faces = 500
+[scenes]
+levels = [1]
+objects_per_clutter = 3
+[scenes.clutters_per_level]
+train = 2
+val = 1
+test = 1
+[camera]
+width_px = 256
+height_px = 212
+[grasps]
+count = 240
+[network]
+layers = 18
+channels = [8, 8, 16, 16]
+[train]
+epochs = 2
+batch_size = 32
+[evaluate]
+attempts_per_clutter = 2
+[evaluate.policy]
+candidates = 24
+"""
+
+
+def run_stage(stage: str, runs: Path, workers: int) -> subprocess.CompletedProcess[str]:
+    environment = {k: v for k, v in os.environ.items() if k not in ("MESH_DIR", "RUN", "WORKERS")}
+    return subprocess.run(
+        [
+            *(sys.executable, "-m", f"stages.{stage}", "--run", "tiny"),
+            *("--runs-dir", str(runs), "--workers", str(workers)),
+        ],
+        cwd=ROOT,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )

@@ -1,0 +1,115 @@
+"""All six stages on a tiny run: artifacts, recordings, and the same bytes from any workers."""
+
+import hashlib
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.artifacts import open_artifact, read_provenance
+from pipeline.artifacts.object_messages import read_objects
+from pipeline.artifacts.scene_messages import read_scenes
+from pipeline.execution import RunFolder
+from schemas.softgrip.v1.evaluation_pb2 import Attempt, LevelResult
+from schemas.softgrip.v1.training_pb2 import TrainingResult
+from stages.graph import STAGES
+from stages.shards import read_split
+from tests.stages.conftest import TINY, run_stage
+
+
+def make_run(runs: Path, workers: int) -> RunFolder:
+    folder = RunFolder(runs / "tiny")
+    folder.path.mkdir(parents=True)
+    folder.config.write_text(TINY)
+    for stage in STAGES:
+        done = run_stage(stage, runs, workers)
+        assert done.returncode == 0, done.stderr[-3000:]
+    return folder
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
+    return make_run(tmp_path_factory.mktemp("one") / "runs", workers=1)
+
+
+def digests(folder: RunFolder) -> dict[str, str]:
+    files = [*folder.path.glob("*.mcap"), *folder.path.glob("*/*/*.mcap")]
+    files += [*folder.path.glob("*/*.mcap"), *folder.path.glob("train/*")]
+    return {
+        str(path.relative_to(folder.path)): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in files
+        if path.is_file()
+    }
+
+
+def test_two_workers_write_the_bytes_of_one(
+    run: RunFolder, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    other = make_run(tmp_path_factory.mktemp("two") / "runs", workers=2)
+    assert digests(other) == digests(run)
+    assert len(digests(run)) > 10
+
+
+def test_every_stage_leaves_artifact_recording_and_summary(run: RunFolder) -> None:
+    for name in STAGES:
+        provenance = read_provenance(run.artifact(name))
+        summary = json.loads(run.summary(name).read_text())
+        assert provenance.stage == name
+        assert summary["key"] == provenance.key
+        assert summary["wall_time_s"] > 0
+        assert run.recording(name).stat().st_size > 1000
+
+
+def test_a_second_run_of_any_stage_does_nothing(run: RunFolder) -> None:
+    before = digests(run)
+    for name in STAGES:
+        done = run_stage(name, run.path.parent, workers=2)
+        assert done.returncode == 0
+        assert f"{name}: up to date, nothing to do" in done.stderr
+    assert digests(run) == before
+
+
+def test_no_object_is_in_two_splits(run: RunFolder) -> None:
+    split_of = {name: split for name, (_, split) in read_objects(run.artifact("objects")).items()}
+    assert set(split_of.values()) == {"train", "val", "test"}
+    for scene in read_scenes(run.artifact("scenes")):
+        assert {split_of[p.object_name] for p in scene.objects} == {scene.split}
+
+
+def test_samples_are_whole_and_span_good_and_bad(run: RunFolder) -> None:
+    samples = [read_split(run.artifact("shards"), split) for split in ("train", "val", "test")]
+    assert sum(map(len, samples)) == 240
+    quality = np.concatenate([part.quality for part in samples])
+    assert quality.min() >= 0
+    assert quality.max() <= 1
+    assert quality.std() > 0.1
+    for part in samples:
+        assert part.cloud.shape[1:] == (24, 24, 3)
+        assert (part.cloud_mask.mean(axis=(1, 2)) > 0).all()
+        assert np.isfinite(part.cloud).all()
+        assert (part.cloud[~part.cloud_mask] == 0).all()
+
+
+def test_training_and_evaluation_report_what_they_did(run: RunFolder) -> None:
+    with open_artifact(run.artifact("train")) as artifact:
+        result = artifact.one(TrainingResult)
+        assert artifact.attachment("ga_cnn.safetensors")
+        assert artifact.attachment("ga_cnn.onnx")
+    assert 0 < result.test_mae < 1
+    with open_artifact(run.artifact("evaluate")) as artifact:
+        attempts = [message for _, message in artifact.messages(Attempt)]
+        (level,) = (message for _, message in artifact.messages(LevelResult))
+    assert level.attempts == len(attempts) <= 2
+    assert level.lifted == sum(made.outcome == "lifted" for made in attempts)
+    assert level.lifted + sum(level.failures.values()) == level.attempts
+
+
+def test_a_stage_without_its_input_says_which_and_how(tmp_path: Path) -> None:
+    folder = RunFolder(tmp_path / "runs" / "tiny")
+    folder.path.mkdir(parents=True)
+    folder.config.write_text(TINY)
+    done = run_stage("grasps", tmp_path / "runs", workers=1)
+    assert done.returncode == 1
+    assert "objects.mcap is missing" in done.stderr
+    assert "Traceback" not in done.stderr
