@@ -1,6 +1,7 @@
 """Gaps, contacts and interpenetration between true meshes, measured with FCL."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import fcl
 import numpy as np
@@ -18,11 +19,7 @@ class Surface:
 
     def __init__(self, mesh: Mesh) -> None:
         self.mesh = mesh
-        model = fcl.BVHModel()
-        model.beginModel(len(mesh.vertices_m), len(mesh.faces))
-        model.addSubModel(mesh.vertices_m, mesh.faces)
-        model.endModel()
-        self._collision = fcl.CollisionObject(model)
+        self._collision = fcl.CollisionObject(_bounding_volumes(mesh))
 
     def at(self, world_from_object: Float[np.ndarray, "4 4"]) -> fcl.CollisionObject:
         """FCL's object, moved there. One pose at a time: the next call moves it on."""
@@ -30,6 +27,16 @@ class Surface:
             fcl.Transform(world_from_object[:3, :3].copy(), world_from_object[:3, 3].copy())
         )
         return self._collision
+
+
+@lru_cache(maxsize=256)
+def _bounding_volumes(mesh: Mesh) -> fcl.BVHModel:
+    """The mesh's tree, built once: it takes far longer than a query."""
+    model = fcl.BVHModel()
+    model.beginModel(len(mesh.vertices_m), len(mesh.faces))
+    model.addSubModel(mesh.vertices_m, mesh.faces)
+    model.endModel()
+    return model
 
 
 def gap_m(

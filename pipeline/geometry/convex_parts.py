@@ -24,21 +24,22 @@ from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.shape import volume
 
 # PhysX cooks convex meshes of up to 255 vertices; fewer make contacts cheaper.
-_MOST_VERTICES = 120
+_MOST_VERTICES = 127
 # A mesh that fills this share of its convex hull is its own only part.
 _CONVEX_SHARE = 0.995
 _SEED = 0
+_CUBE_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
 # Parts with less of the mesh's volume than this have lost some of it.
 _LEAST_COVERAGE = 0.9
 _MOST_DECIMATION_SHARE = 0.02
 # Part of the cache key: raise it when what is computed from equal inputs changes.
-_METHOD_VERSION = 5
+_METHOD_VERSION = 7
 
 
 def convex_parts(mesh: Mesh, config: ConvexPartsConfig, cache_dir: Path) -> tuple[Mesh, ...]:
     """Closed convex meshes that together cover a closed mesh, in its frame.
 
-    At most config.max_parts parts of at most 120 vertices each; deterministic. Results are kept
+    At most config.max_parts parts of at most 127 vertices each; deterministic. Results are kept
     in cache_dir by a digest of mesh, parameters and CoACD's version; a damaged entry is
     recomputed.
     """
@@ -156,25 +157,45 @@ def cache_key(mesh: Mesh, config: ConvexPartsConfig) -> str:
 
 
 def _within_limit(hull: Mesh) -> Mesh:
-    """A hull of at most 120 vertices, so of fewer than the 255 faces PhysX takes.
+    """A hull of at most 127 vertices, so of fewer than the 255 faces PhysX takes.
 
-    Kept are the support points of directions spread over the sphere; half of what the hull then
-    lacks is made up by growing it, so that it errs to both sides alike.
+    Of vertices spread evenly over all directions (good for round bodies) and vertices taken in
+    greedily (good for flat sides), those are kept whose hull lacks less; half of what it lacks
+    is made up by growing it, so that it errs to both sides alike.
     """
-    if len(hull.vertices_m) <= _MOST_VERTICES:
+    points = hull.vertices_m
+    if len(points) <= _MOST_VERTICES:
         return hull
-    index = np.arange(_MOST_VERTICES) + 0.5
-    height, turn = 1.0 - 2.0 * index / _MOST_VERTICES, np.pi * (1.0 + 5.0**0.5) * index
-    ring = np.sqrt(1.0 - height**2)
-    directions = np.stack([ring * np.cos(turn), ring * np.sin(turn), height], axis=1)
-    kept = convex_hull(
-        hull.vertices_m[np.unique(np.argmax(directions @ hull.vertices_m.T, axis=1))]
+    tried = [convex_hull(points[chosen]) for chosen in (_spread(points), _greedy(points))]
+    lacking, kept = min(
+        ((max(float(_outside_of(mesh, points).max()), 0.0), mesh) for mesh in tried),
+        key=lambda pair: pair[0],
     )
-    lacking = max(float(_outside_of(kept, hull.vertices_m).max()), 0.0)
     centre = kept.vertices_m.mean(axis=0)
     reach = float(np.linalg.norm(kept.vertices_m - centre, axis=1).mean())
     grown = centre + (kept.vertices_m - centre) * (1.0 + 0.5 * lacking / reach)
     return Mesh(grown, kept.faces)
+
+
+def _spread(points: Float[np.ndarray, "n 3"]) -> list[int]:
+    """Support points of directions on a Fibonacci lattice of the sphere."""
+    index = np.arange(_MOST_VERTICES) + 0.5
+    height, turn = 1.0 - 2.0 * index / _MOST_VERTICES, np.pi * (1.0 + 5.0**0.5) * index
+    ring = np.sqrt(1.0 - height**2)
+    directions = np.stack([ring * np.cos(turn), ring * np.sin(turn), height], axis=1)
+    return _support(points, directions)
+
+
+def _greedy(points: Float[np.ndarray, "n 3"]) -> list[int]:
+    """Each time the point farthest outside the hull of those before."""
+    chosen = _support(points, np.concatenate([np.eye(3), -np.eye(3), _CUBE_CORNERS]))
+    for _ in range(_MOST_VERTICES - len(chosen)):
+        chosen.append(int(np.argmax(_outside_of(convex_hull(points[chosen]), points))))
+    return chosen
+
+
+def _support(points: Float[np.ndarray, "n 3"], directions: Float[np.ndarray, "k 3"]) -> list[int]:
+    return list(dict.fromkeys(np.argmax(directions @ points.T, axis=1).tolist()))
 
 
 def _read(entry: Path) -> tuple[Mesh, ...] | None:
