@@ -14,7 +14,6 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
-import coacd
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial import ConvexHull
@@ -75,6 +74,10 @@ def _run_coacd(
 ) -> tuple[Mesh, ...]:
     """CoACD's parts. Its preprocessing rebuilds the surface, at up to six times the cost and
     with thicker walls: needed only where cutting the closed surface itself loses material."""
+    # Not at the top: SAPIEN must be loaded before it in a process that renders (see
+    # pipeline/simulation/vulkan.py), and most processes need no CoACD.
+    import coacd
+
     coacd.set_log_level("off")
     raw = coacd.run_coacd(
         coacd.Mesh(mesh.vertices_m, mesh.faces.astype(np.int32)),

@@ -144,7 +144,7 @@ def mean_normals(
     """
     tree = cKDTree(surface.points_m)
     near = tree.query_ball_point(points_m, radius_m)
-    counts = np.array([len(indices) for indices in near])
+    counts = np.array([len(indices) for indices in near], dtype=np.int64)
     owner = np.repeat(np.arange(len(points_m)), counts)
     flat = np.concatenate([np.asarray(i, dtype=np.int64) for i in near]) if len(near) else owner
     sums = np.zeros((len(points_m), 3))

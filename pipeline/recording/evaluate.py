@@ -9,7 +9,7 @@ import rerun.blueprint as rrb
 from pipeline.artifacts.tensors import from_tensor
 from pipeline.geometry.mesh import Mesh
 from pipeline.recording import colours
-from pipeline.recording.recording import step
+from pipeline.recording.recording import looking, name_curve, step, time_panel
 from pipeline.recording.shapes import shown_mesh, shown_pose
 from schemas.softgrip.v1.evaluation_pb2 import Attempt
 
@@ -21,7 +21,11 @@ def blueprint() -> rrb.Blueprint:
     """Opens on the first failure."""
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Spatial3DView(origin="/world", name="Scene, pad and its path"),
+            rrb.Spatial3DView(
+                origin="/world",
+                name="Scene, pad and its path",
+                eye_controls=looking((-0.8, -0.8, 0.7), (0.0, 0.0, 0.1)),
+            ),
             rrb.Vertical(
                 rrb.TextDocumentView(origin="/notes/attempt", name="Attempt"),
                 rrb.TimeSeriesView(origin="/curves/force", name="load on the pad in N"),
@@ -30,7 +34,7 @@ def blueprint() -> rrb.Blueprint:
             ),
             column_shares=[3, 2],
         ),
-        rrb.TimePanel(timeline=TIMELINE, state="collapsed"),
+        time_panel(TIMELINE),
         collapse_panels=True,
     )
 
@@ -46,6 +50,10 @@ def show_attempts(
     stream.log(
         "notes/result", rr.TextDocument(table, media_type=rr.MediaType.MARKDOWN), static=True
     )
+    for quantity, unit in (("force", "N"), ("moment", "N m")):
+        for axis, hue in (("x", 5), ("y", 2), ("z", 1)):
+            curve, label = f"curves/{quantity}/{axis}", f"{axis} in {unit}"
+            name_curve(stream, curve, label, colours.PALETTE[hue])
     frame = 0
     for made in sorted(attempts, key=lambda a: (a.outcome == "lifted", a.scene_id, a.attempt)):
         step(stream, TIMELINE, frame)

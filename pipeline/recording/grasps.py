@@ -19,7 +19,7 @@ from pipeline.geometry.transforms import invert
 from pipeline.gripper.balancing import quality_histogram
 from pipeline.gripper.pad import Pad
 from pipeline.recording import colours
-from pipeline.recording.recording import step
+from pipeline.recording.recording import looking, name_curve, step, time_panel
 from pipeline.recording.shapes import shown_mesh
 
 TIMELINE = "grasp"
@@ -48,6 +48,7 @@ def blueprint() -> rrb.Blueprint:
             rrb.Spatial3DView(
                 origin="/world",
                 name="Pad (green: in contact), cloud and wrench, in GCS",
+                eye_controls=looking((-0.09, -0.13, 0.11), (0.0, 0.0, -0.01)),
             ),
             rrb.Vertical(
                 rrb.TextDocumentView(origin="/notes/grasp", name="Grasp"),
@@ -58,7 +59,7 @@ def blueprint() -> rrb.Blueprint:
             ),
             column_shares=[3, 2],
         ),
-        rrb.TimePanel(timeline=TIMELINE, state="collapsed"),
+        time_panel(TIMELINE),
         collapse_panels=True,
     )
 
@@ -72,6 +73,8 @@ def show_grasps(
 ) -> None:
     """Log the grasps from the best to the worst; ``quality`` are the labels of all grasps."""
     stream.log("curves/quality", rr.BarChart(quality_histogram(quality)), static=True)
+    name_curve(stream, "curves/label/q", "q", colours.PALETTE[2])
+    name_curve(stream, "curves/label/p", "p", colours.PALETTE[1])
     ordered = sorted(grasps, key=lambda shown: -shown.grasps.quality[shown.row])
     for number, shown in enumerate(ordered):
         step(stream, TIMELINE, number)
@@ -117,7 +120,7 @@ def _show_pad(stream: rr.RecordingStream, shown: ShownGrasp, pad: Pad) -> None:
     seen = grasps.cloud_mask[row]
     points = grasps.cloud[row][seen].astype(np.float64) * pad.radius_m
     points[:, 2] -= grasps.touch_height_m[row]
-    stream.log("world/cloud", rr.Points3D(points, radii=5e-4, colors=[0, 0, 0]))
+    stream.log("world/cloud", rr.Points3D(points, radii=5e-4, colors=colours.PALETTE[3]))
     f_x, f_y, f_z, _ = grasps.wrench[row]
     # The vacuum pulls the object up, out along +z.
     stream.log(

@@ -11,7 +11,7 @@ from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.shape import COMPLEX_FROM, TYPICAL_FROM
 from pipeline.recording import colours
-from pipeline.recording.recording import step
+from pipeline.recording.recording import looking, name_curve, step, time_panel
 from pipeline.recording.shapes import shown_mesh
 
 TIMELINE = "object"
@@ -22,7 +22,11 @@ def blueprint() -> rrb.Blueprint:
     """Opens on the whole catalogue; stepping through shows one object after the other."""
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Spatial3DView(origin="/world/catalogue", name="Catalogue, coloured by class"),
+            rrb.Spatial3DView(
+                origin="/world/catalogue",
+                name="Catalogue, coloured by class, NSVR growing",
+                eye_controls=looking((0.5, -2.2, 1.5), (0.5, -0.45, 0.0)),
+            ),
             rrb.Vertical(
                 rrb.Spatial3DView(origin="/world/object", name="Object and its convex parts"),
                 rrb.TimeSeriesView(origin="/curves/nsvr", name="NSVR and its two thresholds"),
@@ -31,7 +35,7 @@ def blueprint() -> rrb.Blueprint:
             ),
             column_shares=[3, 2],
         ),
-        rrb.TimePanel(timeline=TIMELINE, state="collapsed"),
+        time_panel(TIMELINE),
         collapse_panels=True,
     )
 
@@ -41,15 +45,20 @@ def show_catalogue(
 ) -> None:
     """Every object on a grid, and a step of the timeline for each, by growing NSVR."""
     columns = int(np.ceil(np.sqrt(len(items))))
-    for threshold, name in (
-        (TYPICAL_FROM, "typical_from"),
-        (COMPLEX_FROM, "complex_from"),
+    for threshold, name, shape_class in (
+        (TYPICAL_FROM, "typical_from", "typical"),
+        (COMPLEX_FROM, "complex_from", "complex"),
     ):
-        stream.log(f"curves/nsvr/{name}", rr.SeriesLines(widths=1), static=True)
+        label = f"{shape_class} from {threshold}"
+        name_curve(stream, f"curves/nsvr/{name}", label, colours.SHAPE_CLASS[shape_class])
         for index in range(len(items)):
             step(stream, TIMELINE, index)
             stream.log(f"curves/nsvr/{name}", rr.Scalars(threshold))
-    stream.log("curves/nsvr/object", rr.SeriesPoints(marker_sizes=4), static=True)
+    stream.log(
+        "curves/nsvr/object",
+        rr.SeriesPoints(names="NSVR", colors=colours.SHAPE_CLASS["basic"], marker_sizes=4),
+        static=True,
+    )
     for index, (item, split) in enumerate(sorted(items, key=lambda pair: pair[0].nsvr)):
         place = SPACING_M * np.array([index % columns, -(index // columns), 0.0])
         colour = colours.SHAPE_CLASS[item.shape_class]
@@ -62,6 +71,7 @@ def show_catalogue(
                 [place + np.array([0.0, 0.0, 0.7 * item.mesh.extents_m[2]])],
                 labels=[f"{item.name} {item.nsvr:.2f}"],
                 radii=0.0005,
+                colors=colours.PALETTE[7],
                 show_labels=len(items) <= 20,
             ),
             static=True,

@@ -10,8 +10,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
+from jaxtyping import UInt8
 
 from pipeline.artifacts.publishing import published
 
@@ -34,6 +36,25 @@ def recording(
         finally:
             stream.flush()
             stream.disconnect()
+
+
+def looking(
+    from_m: tuple[float, float, float], at_m: tuple[float, float, float]
+) -> rrb.EyeControls3D:
+    """Where a 3-D view's eye stands and what it looks at, z up."""
+    return rrb.EyeControls3D(position=from_m, look_target=at_m, eye_up=(0.0, 0.0, 1.0))
+
+
+def time_panel(timeline: str) -> rrb.TimePanel:
+    """The collapsed time panel, standing still on the recording's one timeline."""
+    return rrb.TimePanel(timeline=timeline, state="collapsed", play_state="paused")
+
+
+def name_curve(
+    stream: rr.RecordingStream, path: str, name: str, colour: UInt8[np.ndarray, " 3"]
+) -> None:
+    """Name and colour of the curve logged under ``path``."""
+    stream.log(path, rr.SeriesLines(names=name, colors=colour, widths=1.5), static=True)
 
 
 def step(stream: rr.RecordingStream, timeline: str, index: int) -> None:

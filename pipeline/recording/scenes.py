@@ -10,7 +10,7 @@ from pipeline.clutter.levels import level_of
 from pipeline.clutter.scene import ClutterScene
 from pipeline.geometry.mesh import Mesh
 from pipeline.recording import colours
-from pipeline.recording.recording import step
+from pipeline.recording.recording import looking, step, time_panel
 from pipeline.recording.shapes import shown_mesh, shown_pose
 from pipeline.sensing.cameras import points_of_depth
 from pipeline.sensing.view import CameraView
@@ -25,7 +25,16 @@ def blueprint() -> rrb.Blueprint:
     first = "/world/camera_0"
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Spatial3DView(origin="/world", name="Scene, cameras and coloured cloud"),
+            rrb.Spatial3DView(
+                origin="/world",
+                contents=[
+                    "$origin/**",
+                    "- $origin/camera_0/depth",
+                    "- $origin/camera_0/segmentation",
+                ],
+                name="Scene, cameras and coloured cloud",
+                eye_controls=looking((-0.75, -0.75, 0.7), (0.05, 0.05, 0.05)),
+            ),
             rrb.Vertical(
                 rrb.Spatial2DView(
                     origin=f"{first}/colour", contents=f"{first}/colour", name="Colour"
@@ -40,7 +49,7 @@ def blueprint() -> rrb.Blueprint:
             ),
             column_shares=[3, 2],
         ),
-        rrb.TimePanel(timeline=TIMELINE, state="collapsed"),
+        time_panel(TIMELINE),
         collapse_panels=True,
     )
 

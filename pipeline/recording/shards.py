@@ -7,7 +7,7 @@ import rerun.blueprint as rrb
 from pipeline.artifacts.sample_messages import Samples
 from pipeline.gripper.balancing import quality_histogram
 from pipeline.recording import colours
-from pipeline.recording.recording import spread, step
+from pipeline.recording.recording import looking, spread, step, time_panel
 
 TIMELINE = "sample"
 SHEET_COLUMNS = 10
@@ -19,8 +19,16 @@ def blueprint() -> rrb.Blueprint:
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Vertical(
-                rrb.Spatial3DView(origin="/world/sheet", name="Clouds by growing q, units of r_G"),
-                rrb.Spatial3DView(origin="/world/cloud", name="One cloud, coloured by height"),
+                rrb.Spatial3DView(
+                    origin="/world/sheet",
+                    name="Clouds by growing q, units of r_G",
+                    eye_controls=looking((13.5, -45.0, 30.0), (13.5, -13.0, 0.0)),
+                ),
+                rrb.Spatial3DView(
+                    origin="/world/cloud",
+                    name="One cloud, coloured by height",
+                    eye_controls=looking((1.6, -2.2, 1.6), (0, 0, 0)),
+                ),
                 row_shares=[3, 2],
             ),
             rrb.Vertical(
@@ -32,7 +40,7 @@ def blueprint() -> rrb.Blueprint:
             ),
             column_shares=[3, 2],
         ),
-        rrb.TimePanel(timeline=TIMELINE, state="collapsed"),
+        time_panel(TIMELINE),
         collapse_panels=True,
     )
 

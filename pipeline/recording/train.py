@@ -10,10 +10,11 @@ from pipeline.artifacts.sample_messages import Samples
 from pipeline.artifacts.training_messages import TestFigures
 from pipeline.network.training import EpochMetrics
 from pipeline.recording import colours
-from pipeline.recording.recording import step
+from pipeline.recording.recording import looking, name_curve, step, time_panel
 
 TIMELINE = "epoch"
-SHEET_COLUMNS = 10
+SHEET_COLUMNS = 6
+SHEET_SAMPLES = 24
 SHEET_SPACING = 3.0  # in r_G: clouds are 2.4 wide
 SCATTER_POINTS = 5000
 
@@ -32,10 +33,14 @@ def blueprint() -> rrb.Blueprint:
                 rrb.Spatial2DView(
                     origin="/curves/calibration", name="q-hat (up) against q (right), test split"
                 ),
-                rrb.Spatial3DView(origin="/world/worst", name="Worst test samples: q / q-hat"),
+                rrb.Spatial3DView(
+                    origin="/world/worst",
+                    name="Worst test samples: q / q-hat",
+                    eye_controls=looking((7.5, -18.0, 12.0), (7.5, -4.5, 0.0)),
+                ),
             ),
         ),
-        rrb.TimePanel(timeline=TIMELINE, state="collapsed"),
+        time_panel(TIMELINE),
         collapse_panels=True,
     )
 
@@ -48,6 +53,9 @@ def show_training(
     wanted: int,
 ) -> None:
     """Log the curve, the calibration and the ``wanted`` worst samples."""
+    for name, colour in (("train", 4), ("val", 0), ("mean_predictor", 7)):
+        name_curve(stream, f"curves/error/{name}", name.replace("_", " "), colours.PALETTE[colour])
+    name_curve(stream, "curves/rate", "learning rate", colours.PALETTE[6])
     for metrics in history:
         step(stream, TIMELINE, metrics.epoch)
         stream.log("curves/error/train", rr.Scalars(metrics.train_mae))
@@ -93,7 +101,7 @@ def _show_worst(
     stream: rr.RecordingStream, figures: TestFigures, test_set: Samples, wanted: int
 ) -> None:
     error = np.abs(figures.predicted - figures.quality)
-    for number, index in enumerate(np.argsort(-error, kind="stable")[:wanted]):
+    for number, index in enumerate(np.argsort(-error, kind="stable")[: min(wanted, SHEET_SAMPLES)]):
         shift = SHEET_SPACING * np.array([number % SHEET_COLUMNS, -(number // SHEET_COLUMNS), 0])
         points = test_set.cloud[index][test_set.cloud_mask[index]].astype(np.float32) + shift
         colour = colours.by_value(figures.quality[index : index + 1])
@@ -103,6 +111,11 @@ def _show_worst(
         label = f"{figures.quality[index]:.2f} / {figures.predicted[index]:.2f}"
         stream.log(
             f"world/worst/{number:03d}/label",
-            rr.Points3D([shift + np.array([0, 1.4, 0])], labels=[label], radii=0.01),
+            rr.Points3D(
+                [shift + np.array([0, 1.4, 0])],
+                labels=[label],
+                radii=0.01,
+                colors=colours.PALETTE[7],
+            ),
             static=True,
         )

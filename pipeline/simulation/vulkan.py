@@ -1,6 +1,7 @@
 """Which Vulkan driver renders: the machine's GPU, or Mesa's lavapipe on the CPU."""
 
 import os
+import sys
 from pathlib import Path
 
 import sapien
@@ -13,6 +14,9 @@ _MANIFEST_FOLDERS = (
     Path("/usr/local/share/vulkan/icd.d"),
     Path("/usr/share/vulkan/icd.d"),
 )
+# CoACD's library and SAPIEN's share symbols that the linker makes one a process. With CoACD's
+# taken, lavapipe's pictures have the right depth and no light (coacd 1.0.14, sapien 3.0.3).
+_COACD_CAME_FIRST = "coacd" in sys.modules
 _USER_CHOICES = ("VK_ICD_FILENAMES", "VK_DRIVER_FILES")
 
 
@@ -39,8 +43,13 @@ def choose_vulkan_driver() -> None:
 def new_render_system() -> sapien.render.RenderSystem:
     """A SAPIEN render system on the chosen driver.
 
-    Raises MachineError where no Vulkan driver can render.
+    Raises MachineError where no Vulkan driver can render, or pictures would have no light.
     """
+    if _COACD_CAME_FIRST:
+        raise MachineError(
+            "coacd was imported before sapien, and pictures rendered then are black",
+            "Import sapien first, or coacd only where convex parts are computed",
+        )
     choose_vulkan_driver()
     try:
         return sapien.render.RenderSystem()

@@ -99,3 +99,9 @@ def test_same_seed_gives_the_same_proposals(sphere: VisibleSurface) -> None:
     one = propose(sphere, 50, GraspsConfig(), np.random.default_rng(9))
     two = propose(sphere, 50, GraspsConfig(), np.random.default_rng(9))
     assert one.world_from_contact.tobytes() == two.world_from_contact.tobytes()
+
+
+def test_no_grasp_has_no_nearby_grasps(sphere: VisibleSurface) -> None:
+    rng = np.random.default_rng(0)
+    none = propose(sphere, 3, GraspsConfig(), rng).take(np.array([], dtype=np.int64))
+    assert len(propose_nearby(sphere, none, GraspsConfig(), rng)) == 0

@@ -1,5 +1,7 @@
 """Depth is metric, both renderers agree, and the grid lies as it says."""
 
+import subprocess
+import sys
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -84,6 +86,8 @@ def test_sapien_and_rays_agree(view: CameraView, objects: Mapping[str, Catalogue
     )
     one, two = (renderer.rendered(scene, objects).views[0] for _ in range(2))
     assert one.depth_m.tobytes() == two.depth_m.tobytes()
+    # Lit: no pixel of the ball or the table is black.
+    assert one.colour.max(axis=2)[one.depth_m > 0].min() > 20
     same = one.segmentation == view.segmentation
     assert same.mean() > 0.999
     assert (np.abs(one.depth_m - view.depth_m)[same] < 1e-4).mean() > 0.999
@@ -136,3 +140,22 @@ def test_a_flat_top_is_seen_whole_and_a_blind_camera_sees_nothing(view: CameraVi
     blind = replace(view, depth_m=np.zeros_like(view.depth_m))
     _, nothing = sub_clouds(blind.depth_m, view.camera, at(0, 0, 0.1)[None], SensingConfig(), 0.025)
     assert not nothing.any()
+
+
+def test_pictures_are_lit_where_convex_parts_are_computed_too() -> None:
+    """CoACD and SAPIEN share a process; the order in which they load must not turn it dark."""
+    script = (
+        "import coacd\n"
+        "from pipeline.config import CameraConfig, ScenesConfig\n"
+        "from pipeline.errors import MachineError\n"
+        "from pipeline.sensing.cameras import cameras_of\n"
+        "from pipeline.sensing.sapien_rendering import rendered_table\n"
+        "try:\n"
+        "    rendered_table(ScenesConfig(), cameras_of(CameraConfig())[0])\n"
+        "except MachineError as error:\n"
+        "    print(error)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    assert "coacd" in done.stdout

@@ -71,11 +71,11 @@ def golf_ball() -> Solid:
     height = 1 - 2 * (np.arange(count) + 0.5) / count
     turn = math.pi * (3 - math.sqrt(5)) * np.arange(count)
     ring = np.sqrt(1 - height**2)
-    centres = (radius + 0.0030) * np.column_stack(
+    centres = (radius + 0.0072) * np.column_stack(
         [ring * np.cos(turn), ring * np.sin(turn), height]
     )
-    dimple = Solid.sphere(0.0036, 16)
-    return Solid.sphere(radius, 48) - union([dimple.translate(tuple(c)) for c in centres.tolist()])
+    dimple = Solid.sphere(0.0080, 64)
+    return Solid.sphere(radius, 72) - union([dimple.translate(tuple(c)) for c in centres.tolist()])
 
 
 def egg() -> Solid:

@@ -1,0 +1,94 @@
+"""The Rerun viewer without a screen: a recording opened, checked and photographed."""
+
+import socket
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from rerun.experimental import ViewerClient
+
+from pipeline.errors import MachineError, SoftgripError
+from pipeline.simulation.vulkan import choose_vulkan_driver
+
+_PATIENCE_S = 60.0
+_PAUSE_S = 0.5
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What a person sees who opens a recording.
+
+    window_png, view_png : the whole window, and each view by its name.
+    problems : what the viewer could not show, and why.
+    timeline : the timeline it opens on.
+    """
+
+    window_png: bytes
+    view_png: dict[str, bytes]
+    problems: tuple[str, ...]
+    timeline: str
+
+
+def sight_of(recording: Path, step: int | None = None) -> Sight:
+    """Open ``recording`` in the viewer, off screen, and look once it stands still.
+
+    step : where on its timeline; None is where it opens by itself.
+
+    Raises
+    ------
+    MachineError : the viewer does not start, as without any graphics driver.
+    SoftgripError : the recording does not finish loading.
+    """
+    choose_vulkan_driver()
+    viewer = Path(sys.executable).with_name("rerun")
+    try:
+        client = ViewerClient.spawn(
+            headless=True,
+            port=_free_port(),
+            hide_welcome_screen=True,
+            executable_path=str(viewer),
+        )
+        client.get_state()
+    except (RuntimeError, ConnectionError) as error:
+        raise MachineError(
+            f"the Rerun viewer does not start ({error})", "Run `make doctor`"
+        ) from error
+    with client:
+        client.open(str(recording.resolve()))
+        if step is not None:
+            client.set_time(sequence=step)
+        window = _settled(client, recording)
+        state = client.get_state()
+        views = {
+            view.name or view.origin: client.take_screenshot(view.view_id)
+            for view in state.views
+            if view.visible
+        }
+        problems = tuple(
+            f"{view.name}: {report}" for view in state.views for report in view.reports
+        )
+        (shown,) = state.recordings
+        return Sight(window, views, problems, shown.current_timeline or "")
+
+
+def _settled(client: ViewerClient, recording: Path) -> bytes:
+    """The window once nothing loads and two looks in a row are the same."""
+    before, deadline = b"", time.monotonic() + _PATIENCE_S
+    while time.monotonic() < deadline:
+        time.sleep(_PAUSE_S)
+        state = client.get_state()
+        window: bytes = client.take_screenshot()
+        if not state.loading and state.active_recording and window == before:
+            return window
+        before = window
+    raise SoftgripError(
+        f"{recording} did not stand still in the viewer for {_PATIENCE_S:.0f} s",
+        "Open it by hand: .venv/bin/rerun with its path",
+    )
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
