@@ -101,7 +101,8 @@ def publish(
 ) -> None:
     """Write the recording, then the artifact: what is there last makes the stage whole."""
     shown = [objects[i] for i in spread(len(objects), stage.config.recording.objects)]
-    with recording(stage.recording, stage.stage.name, stage.key.digest, blueprint()) as stream:
+    opening = blueprint(len(shown))
+    with recording(stage.recording, stage.stage.name, stage.key.digest, opening) as stream:
         show_catalogue(stream, [(item, split[item.name]) for item in shown])
     with ArtifactWriter(stage.output, stage.provenance()) as artifact:
         for index, item in enumerate(objects):

@@ -9,7 +9,7 @@ import rerun.blueprint as rrb
 from pipeline.artifacts.tensors import from_tensor
 from pipeline.geometry.mesh import Mesh
 from pipeline.recording import colours
-from pipeline.recording.recording import looking, name_curve, step, time_panel
+from pipeline.recording.recording import looking, name_curve, numbered, step, time_panel
 from pipeline.recording.shapes import shown_mesh, shown_pose
 from schemas.softgrip.v1.evaluation_pb2 import Attempt
 
@@ -55,12 +55,13 @@ def show_attempts(
             curve, label = f"curves/{quantity}/{axis}", f"{axis} in {unit}"
             name_curve(stream, curve, label, colours.PALETTE[hue])
     frame = 0
-    for made in sorted(attempts, key=lambda a: (a.outcome == "lifted", a.scene_id, a.attempt)):
+    films = sorted(attempts, key=lambda a: (a.outcome == "lifted", a.scene_id, a.attempt))
+    for number, made in enumerate(films):
         step(stream, TIMELINE, frame)
-        stream.log("world/objects", rr.Clear(recursive=True))
+        objects = numbered(stream, "world/objects", number)
         for index, name in enumerate(names[made.scene_id]):
             colour = colours.by_index(index + 1)
-            stream.log(f"world/objects/{index + 1:02d}", shown_mesh(meshes[name], colour))
+            stream.log(f"{objects}/{index + 1:02d}", shown_mesh(meshes[name], colour))
         stream.log("notes/attempt", rr.TextDocument(_facts(made)))
         path, bodies = from_tensor(made.gripper_path), from_tensor(made.object_paths)
         wrench = from_tensor(made.base_wrench)
@@ -69,14 +70,18 @@ def show_attempts(
         for index in range(len(path)):
             step(stream, TIMELINE, frame)
             frame += 1
-            _show_frame(stream, path[index], bodies[index], wrench[index])
+            _show_frame(stream, objects, path[index], bodies[index], wrench[index])
 
 
 def _show_frame(
-    stream: rr.RecordingStream, pose: np.ndarray, bodies: np.ndarray, wrench: np.ndarray
+    stream: rr.RecordingStream,
+    objects: str,
+    pose: np.ndarray,
+    bodies: np.ndarray,
+    wrench: np.ndarray,
 ) -> None:
     for index, body in enumerate(bodies):
-        path = f"world/objects/{index + 1:02d}"
+        path = f"{objects}/{index + 1:02d}"
         if np.isfinite(body).all():
             stream.log(path, shown_pose(body))
         else:

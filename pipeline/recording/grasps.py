@@ -19,7 +19,7 @@ from pipeline.geometry.transforms import invert
 from pipeline.gripper.balancing import quality_histogram
 from pipeline.gripper.pad import Pad
 from pipeline.recording import colours
-from pipeline.recording.recording import looking, name_curve, step, time_panel
+from pipeline.recording.recording import looking, name_curve, numbered, step, time_panel
 from pipeline.recording.shapes import shown_mesh
 
 TIMELINE = "grasp"
@@ -78,13 +78,15 @@ def show_grasps(
     ordered = sorted(grasps, key=lambda shown: -shown.grasps.quality[shown.row])
     for number, shown in enumerate(ordered):
         step(stream, TIMELINE, number)
-        _show_surroundings(stream, shown.scene, shown.grasps, shown.row, meshes)
+        objects = numbered(stream, "world/objects", number)
+        _show_surroundings(stream, objects, shown.scene, shown.grasps, shown.row, meshes)
         _show_pad(stream, shown, pad)
         _show_figures(stream, shown.origin, shown.grasps, shown.row)
 
 
 def _show_surroundings(
     stream: rr.RecordingStream,
+    path: str,
     scene: ClutterScene,
     grasps: LabelledGrasps,
     row: int,
@@ -92,14 +94,13 @@ def _show_surroundings(
 ) -> None:
     """The target and its near neighbours, in GCS."""
     gripper_from_world = invert(grasps.world_from_gripper[row])
-    stream.log("world/objects", rr.Clear(recursive=True))
     for placed in scene.objects:
         mesh = meshes[placed.object_name].transformed(gripper_from_world @ placed.world_from_object)
         target = placed.body_id == grasps.body_id[row]
         if not target and np.linalg.norm(mesh.vertices_m, axis=1).min() > NEAR_M:
             continue
         colour = colours.PALETTE[1] if target else colours.PALETTE[7]
-        stream.log(f"world/objects/{placed.body_id:02d}", shown_mesh(mesh, colour))
+        stream.log(f"{path}/{placed.body_id:02d}", shown_mesh(mesh, colour))
 
 
 def _show_pad(stream: rr.RecordingStream, shown: ShownGrasp, pad: Pad) -> None:

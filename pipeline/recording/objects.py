@@ -11,21 +11,24 @@ from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.shape import COMPLEX_FROM, TYPICAL_FROM
 from pipeline.recording import colours
-from pipeline.recording.recording import looking, name_curve, step, time_panel
+from pipeline.recording.recording import looking, name_curve, numbered, step, time_panel
 from pipeline.recording.shapes import shown_mesh
 
 TIMELINE = "object"
 SPACING_M = 0.22
 
 
-def blueprint() -> rrb.Blueprint:
+def blueprint(objects: int) -> rrb.Blueprint:
     """Opens on the whole catalogue; stepping through shows one object after the other."""
+    middle = SPACING_M * (_columns(objects) - 1) / 2
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Spatial3DView(
                 origin="/world/catalogue",
                 name="Catalogue, coloured by class, NSVR growing",
-                eye_controls=looking((0.5, -2.2, 1.5), (0.5, -0.45, 0.0)),
+                eye_controls=looking(
+                    (middle, -3.6 * middle - 0.2, 2.2 * middle + 0.2), (middle, -middle, 0.0)
+                ),
             ),
             rrb.Vertical(
                 rrb.Spatial3DView(origin="/world/object", name="Object and its convex parts"),
@@ -44,7 +47,7 @@ def show_catalogue(
     stream: rr.RecordingStream, items: Sequence[tuple[CatalogueObject, str]]
 ) -> None:
     """Every object on a grid, and a step of the timeline for each, by growing NSVR."""
-    columns = int(np.ceil(np.sqrt(len(items))))
+    columns = _columns(len(items))
     for threshold, name, shape_class in (
         (TYPICAL_FROM, "typical_from", "typical"),
         (COMPLEX_FROM, "complex_from", "complex"),
@@ -77,16 +80,15 @@ def show_catalogue(
             static=True,
         )
         step(stream, TIMELINE, index)
-        _show_object(stream, item, split)
+        _show_object(stream, numbered(stream, "world/object", index), item, split)
 
 
-def _show_object(stream: rr.RecordingStream, item: CatalogueObject, split: str) -> None:
-    stream.log("world/object", rr.Clear(recursive=True))
-    stream.log("world/object/mesh", shown_mesh(item.mesh, colours.SHAPE_CLASS[item.shape_class]))
+def _show_object(stream: rr.RecordingStream, path: str, item: CatalogueObject, split: str) -> None:
+    stream.log(f"{path}/mesh", shown_mesh(item.mesh, colours.SHAPE_CLASS[item.shape_class]))
     beside = np.array([1.3 * item.mesh.extents_m[0] + 0.02, 0.0, 0.0])
     for number, part in enumerate(item.convex_parts):
         stream.log(
-            f"world/object/parts/{number}",
+            f"{path}/parts/{number}",
             shown_mesh(moved(part, beside), colours.by_index(number)),
         )
     stream.log("curves/nsvr/object", rr.Scalars(item.nsvr))
@@ -105,6 +107,10 @@ def _show_object(stream: rr.RecordingStream, item: CatalogueObject, split: str) 
             media_type=rr.MediaType.MARKDOWN,
         ),
     )
+
+
+def _columns(objects: int) -> int:
+    return int(np.ceil(np.sqrt(objects)))
 
 
 def moved(mesh: Mesh, offset_m: Float[np.ndarray, " 3"]) -> Mesh:

@@ -62,6 +62,16 @@ def step(stream: rr.RecordingStream, timeline: str, index: int) -> None:
     stream.set_time(timeline, sequence=index)
 
 
+def numbered(stream: rr.RecordingStream, path: str, number: int) -> str:
+    """Path of what is shown at step ``number`` alone; what the step before showed there goes.
+
+    Each step has a path of its own, as a clearing and a logging of one path at one time race.
+    """
+    if number > 0:
+        stream.log(f"{path}/{number - 1:04d}", rr.Clear(recursive=True))
+    return f"{path}/{number:04d}"
+
+
 def spread(total: int, wanted: int) -> list[int]:
     """Indices of at most ``wanted`` items, evenly spread over ``total``."""
     if total <= wanted:

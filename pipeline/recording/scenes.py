@@ -10,7 +10,7 @@ from pipeline.clutter.levels import level_of
 from pipeline.clutter.scene import ClutterScene
 from pipeline.geometry.mesh import Mesh
 from pipeline.recording import colours
-from pipeline.recording.recording import looking, step, time_panel
+from pipeline.recording.recording import looking, numbered, step, time_panel
 from pipeline.recording.shapes import shown_mesh, shown_pose
 from pipeline.sensing.cameras import points_of_depth
 from pipeline.sensing.view import CameraView
@@ -63,9 +63,9 @@ def show_scene(
 ) -> None:
     """One step of the recording."""
     step(stream, TIMELINE, number)
-    stream.log("world/objects", rr.Clear(recursive=True))
+    objects = numbered(stream, "world/objects", number)
     for placed in scene.objects:
-        path = f"world/objects/{placed.body_id:02d}"
+        path = f"{objects}/{placed.body_id:02d}"
         mesh = meshes[placed.object_name]
         stream.log(path, shown_mesh(mesh, colours.by_index(placed.body_id)))
         stream.log(path, shown_pose(placed.world_from_object))

@@ -5,9 +5,12 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
+import typer
 from rerun.experimental import ViewerClient
 
+from pipeline.artifacts import publish_bytes
 from pipeline.errors import MachineError, SoftgripError
 from pipeline.simulation.vulkan import choose_vulkan_driver
 
@@ -92,3 +95,23 @@ def _free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
+
+
+def picture(
+    recording: Annotated[Path, typer.Argument(help="an .rrd file")],
+    png: Annotated[Path, typer.Argument(help="where the picture goes")],
+    step: Annotated[int | None, typer.Option(help="where on the recording's timeline")] = None,
+) -> None:
+    """Photograph a recording as the viewer shows it."""
+    try:
+        sight = sight_of(recording, step)
+    except SoftgripError as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(1) from None
+    publish_bytes(png, sight.window_png)
+    for problem in sight.problems:
+        typer.echo(problem, err=True)
+
+
+if __name__ == "__main__":
+    typer.run(picture)

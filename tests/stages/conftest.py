@@ -5,6 +5,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
+from pipeline.execution import RunFolder
+from stages.graph import STAGES
+
 ROOT = Path(__file__).resolve().parents[2]
 
 TINY = """
@@ -51,3 +56,18 @@ def run_stage(stage: str, runs: Path, workers: int) -> subprocess.CompletedProce
         text=True,
         check=False,
     )
+
+
+def make_run(runs: Path, workers: int) -> RunFolder:
+    folder = RunFolder(runs / "tiny")
+    folder.path.mkdir(parents=True)
+    folder.config.write_text(TINY)
+    for stage in STAGES:
+        done = run_stage(stage, runs, workers)
+        assert done.returncode == 0, done.stderr[-3000:]
+    return folder
+
+
+@pytest.fixture(scope="session")
+def run(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
+    return make_run(tmp_path_factory.mktemp("one") / "runs", workers=1)

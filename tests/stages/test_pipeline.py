@@ -15,22 +15,7 @@ from schemas.softgrip.v1.evaluation_pb2 import Attempt, LevelResult
 from schemas.softgrip.v1.training_pb2 import TrainingResult
 from stages.graph import STAGES
 from stages.shards import read_split
-from tests.stages.conftest import TINY, run_stage
-
-
-def make_run(runs: Path, workers: int) -> RunFolder:
-    folder = RunFolder(runs / "tiny")
-    folder.path.mkdir(parents=True)
-    folder.config.write_text(TINY)
-    for stage in STAGES:
-        done = run_stage(stage, runs, workers)
-        assert done.returncode == 0, done.stderr[-3000:]
-    return folder
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
-    return make_run(tmp_path_factory.mktemp("one") / "runs", workers=1)
+from tests.stages.conftest import make_run, run_stage
 
 
 def digests(folder: RunFolder) -> dict[str, str]:
