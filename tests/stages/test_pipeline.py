@@ -15,7 +15,7 @@ from schemas.softgrip.v1.evaluation_pb2 import Attempt, LevelResult
 from schemas.softgrip.v1.training_pb2 import TrainingResult
 from stages.graph import STAGES
 from stages.shards import read_split
-from tests.stages.conftest import make_run, run_stage
+from tests.stages.conftest import TINY, make_run, run_stage
 
 
 def digests(folder: RunFolder) -> dict[str, str]:

@@ -1,0 +1,67 @@
+"""The report names each thing, its state, and the remedy where it is not well."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from pipeline.machine import doctor, vulkan_driver
+
+
+def test_what_is_there_is_well() -> None:
+    assert doctor.check_python().remedy == ""
+    assert str(sys.version_info.minor) in doctor.check_python().state
+
+
+def test_a_missing_compiler_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", "/nowhere")
+    finding = doctor.check_tools()
+    assert "make" in finding.state
+    assert "cc" in finding.state
+    assert "build-essential" in finding.remedy
+
+
+def test_a_package_off_its_pin_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / ".venv").mkdir()
+    (tmp_path / ".venv/.ready").touch()
+    (tmp_path / "constraints.txt").write_text("numpy==0.0.1\nno-such-package==1.0\n")
+    monkeypatch.setattr(doctor, "ROOT", tmp_path)
+    finding = doctor.check_venv()
+    assert "numpy 0.0.1 (there is" in finding.state
+    assert "no-such-package 1.0 (there is none)" in finding.state
+    assert "make setup" in finding.remedy
+
+
+def test_no_driver_means_the_command_that_installs_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(vulkan_driver, "has_gpu", lambda: False)
+    monkeypatch.setattr(vulkan_driver, "is_ready", lambda: False)
+    monkeypatch.setattr(vulkan_driver, "software_icd", lambda: None)
+    finding = doctor.check_driver()
+    assert "Embree" in finding.state
+    assert "apt-get install" in finding.remedy
+
+
+def test_the_report_fails_when_something_needs_care(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    ill = doctor.Finding("room", "no disk", "free some")
+    monkeypatch.setattr(doctor, "CHECKS", (lambda: doctor.Finding("a", "fine"), lambda: ill))
+    assert doctor.main() == 1
+    assert "to mend it: free some" in capsys.readouterr().out
+    monkeypatch.setattr(doctor, "CHECKS", (lambda: doctor.Finding("a", "fine"),))
+    assert doctor.main() == 0
+
+
+def test_it_runs_before_anything_is_installed() -> None:
+    """`make doctor` may come first, with the system's Python and no package."""
+    bare = subprocess.run(
+        [
+            *(sys.executable, "-S", "-c"),
+            f"import sys; sys.path.insert(0, {str(doctor.ROOT)!r}); import pipeline.machine.doctor",
+        ],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert bare.returncode == 0, bare.stderr
