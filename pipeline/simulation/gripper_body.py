@@ -70,6 +70,9 @@ class FloatingGripper:
         self.time_s = 0.0
         self.samples: list[tuple[float, np.ndarray, dict[int, np.ndarray], np.ndarray, str]] = []
         self._steps = 0
+        self._state = State.OBSERVE
+        self._load = np.zeros(6)
+        self._sample()
 
     def enter(self, state: State) -> None:
         """Name what is being done, for the record."""
@@ -169,11 +172,15 @@ class FloatingGripper:
         self._world.step()
         self.time_s += self._world.timestep
         if self._steps % _SAMPLE_EVERY == 0:
-            poses = {i: body.world_from_object for i, body in self._bodies.items()}
-            self.samples.append(
-                (self.time_s, self._pose.copy(), poses, self._load.copy(), str(self._state))
-            )
+            self._sample()
         self._steps += 1
+
+    def _sample(self) -> None:
+        """Add things as they stand to the trajectory."""
+        poses = {i: body.world_from_object for i, body in self._bodies.items()}
+        self.samples.append(
+            (self.time_s, self._pose.copy(), poses, self._load.copy(), str(self._state))
+        )
 
     def _carry(self) -> None:
         """The joint's force on the object, and on the pad; it breaks over the limits."""

@@ -25,9 +25,6 @@ objects_per_clutter = 3
 train = 2
 val = 1
 test = 1
-[camera]
-width_px = 256
-height_px = 212
 [grasps]
 count = 240
 [network]
