@@ -24,7 +24,7 @@ def blueprint() -> rrb.Blueprint:
             rrb.Spatial3DView(
                 origin="/world",
                 name="Scene, pad and its path",
-                eye_controls=looking((-0.8, -0.8, 0.7), (0.0, 0.0, 0.1)),
+                eye_controls=looking((-0.6, -0.6, 0.5), (0.0, 0.0, 0.08)),
             ),
             rrb.Vertical(
                 rrb.TextDocumentView(origin="/notes/attempt", name="Attempt"),

@@ -23,7 +23,7 @@ TIMELINES = {
     "evaluate": "frame",
 }
 # Least share of a view that is drawn, beyond what an empty one has of words and grid.
-DRAWN = 0.003
+DRAWN = 0.001
 
 
 def drawn_share(png: bytes) -> float:
