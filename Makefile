@@ -3,6 +3,7 @@
 #   RUN=name       which runs/<name>/run.toml        (default: default)
 #   MESH_DIR=path  folder of meshes for the dataset  (default: the embedded object set)
 #   WORKERS=n      worker processes                  (default: all cores)
+#   EXECUTOR=ray   on an existing Ray cluster        (default: local processes)
 
 RUN     ?= default
 PYTHON3 ?= python3
@@ -16,7 +17,7 @@ PY      := .venv/bin/python
 
 # Without MESH_DIR, the goals that make a dataset take the embedded objects, and
 # those that use one (train, eval, ...) stay with the meshes it was made from.
-ifeq (,$(filter dataset objects scenes grasps shards,$(MAKECMDGOALS)))
+ifeq (,$(filter dataset objects scenes grasps shards bench,$(MAKECMDGOALS)))
 MESH_DIR := $(or $(MESH_DIR),$(shell cat $(STATE)/mesh_dir 2>/dev/null))
 endif
 export RUN MESH_DIR WORKERS
@@ -27,7 +28,7 @@ ifeq (,$(strip $(WORKERS)))
 unexport WORKERS
 endif
 
-.PHONY: help dataset objects scenes grasps shards train eval evaluate status doctor setup test lint clean FORCE
+.PHONY: help dataset objects scenes grasps shards train eval evaluate status doctor setup test bench lint clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -78,6 +79,10 @@ doctor:  ## what is present, what is missing, how to mend it
 
 test: .venv/.ready lint  ## lint, types, tests
 	$(PY) -m pytest
+
+bench: .venv/.ready  ## speed of labelling, QP, storage and control, to runs/bench/bench.json
+	@$(MAKE) --no-print-directory scenes RUN=bench
+	@$(PY) -m stages.bench
 
 lint: .venv/.ready
 	$(PY) -m ruff check .

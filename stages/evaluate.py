@@ -72,7 +72,7 @@ def build(stage: StageContext) -> Summary:
         )
         for scene in scenes
     ]
-    done = run_in_order(pick_clutter, jobs, stage.workers)
+    done = run_in_order(pick_clutter, jobs, stage.workers, stage.executor)
     parts = list(progress(done, len(jobs), "evaluate: clutters", "clutter"))
     attempts = [message for part in parts for message in read_attempts(part)]
     results = [level_result(level, scenes, attempts) for level in sorted({s.level for s in scenes})]

@@ -106,7 +106,7 @@ def build(stage: StageContext) -> Summary:
         )
         for index in range(count)
     ]
-    done = run_in_order(synthesize_shard, jobs, stage.workers)
+    done = run_in_order(synthesize_shard, jobs, stage.workers, stage.executor)
     results = list(progress(done, count, "grasps", "scene"))
     quality = np.concatenate([result.quality for result in results])
     record(stage, [result.shard for result in results], quality)

@@ -44,7 +44,7 @@ def build(stage: StageContext) -> Summary:
     cache = stage.folder.path.parent / ".cache" / "convex_parts"
     finish = partial(finished, config=config, seed=seed, cache=cache)
     todo = [item for item in measured if item.source.name in set(chosen)]
-    results = run_in_order(finish, todo, stage.workers)
+    results = run_in_order(finish, todo, stage.workers, stage.executor)
     objects = list(progress(results, len(todo), "objects: convex parts", "object"))
     split = choose_split(
         {item.name: item.shape_class for item in objects}, stage.config.split, seed
@@ -62,7 +62,7 @@ def measure(stage: StageContext) -> tuple[list[MeasuredObject], list[RefusedMesh
         names = object_names(paths, folder)
         jobs = [(path, names[path]) for path in paths]
     job = partial(measured_or_refused, config=stage.config.objects, folder=folder)
-    results = run_in_order(job, jobs, stage.workers)
+    results = run_in_order(job, jobs, stage.workers, stage.executor)
     measured, refused = [], []
     for result in progress(results, len(jobs), "objects: repair and NSVR", "mesh"):
         if isinstance(result, RefusedMesh):

@@ -49,7 +49,7 @@ class SceneJob:
 def build(stage: StageContext) -> Summary:
     """Build, settle and render clutter scenes of every level, from each split's objects."""
     jobs = scene_jobs(stage)
-    done = run_in_order(make_scene, jobs, stage.workers)
+    done = run_in_order(make_scene, jobs, stage.workers, stage.executor)
     parts = list(progress(done, len(jobs), "scenes: settle and render", "scene"))
     publish(stage, parts)
     scenes = [read_scene(stage.output, index) for index in range(len(parts))]

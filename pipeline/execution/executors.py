@@ -11,20 +11,25 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 from pipeline.errors import SoftgripError
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
+Executor = Literal["local", "ray"]
+
 AHEAD_PER_WORKER = 2  # items in flight, so that a slow consumer bounds memory
 
 
 def run_in_order(
-    job: Callable[[Item], Result], items: Iterable[Item], workers: int
+    job: Callable[[Item], Result],
+    items: Iterable[Item],
+    workers: int,
+    executor: Executor = "local",
 ) -> Iterator[Result]:
-    """Yield ``job(item)`` for every item, in order, from ``workers`` processes.
+    """Yield ``job(item)`` for every item, in order, from ``workers`` processes or a Ray cluster.
 
     One worker runs in this process. Processes are spawned, not forked: drivers
     of graphics and threads of native libraries do not survive a fork.
@@ -33,6 +38,11 @@ def run_in_order(
     ------
     SoftgripError : a worker process died (killed, or out of memory).
     """
+    if executor == "ray":
+        from pipeline.execution.ray_executor import run_on_ray  # an optional package
+
+        yield from run_on_ray(job, items)
+        return
     if workers <= 1:
         yield from map(job, items)
         return

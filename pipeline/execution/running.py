@@ -7,6 +7,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from types import FrameType
 from typing import Annotated, Any
@@ -18,6 +19,7 @@ from loguru import logger
 from pipeline.artifacts import open_artifact, publish_bytes, read_provenance
 from pipeline.config import load_run_config
 from pipeline.errors import ArtifactError, ConfigError, SoftgripError
+from pipeline.execution.executors import Executor
 from pipeline.execution.freshness import Key, key_from_json, stage_key
 from pipeline.execution.stage import RunFolder, Stage, StageContext
 from schemas.softgrip.v1.grasps_pb2 import ShardIndex
@@ -43,11 +45,15 @@ def stage_command(stage: Stage, build: Build, inputs_of: InputsOf) -> None:
         workers: Annotated[
             int, typer.Option(envvar="WORKERS", min=1, help="worker processes")
         ] = len(os.sched_getaffinity(0)),
+        executor: Annotated[
+            Executor, typer.Option(envvar="EXECUTOR", help="local processes, or a Ray cluster")
+        ] = "local",
         force: Annotated[bool, typer.Option(help="run even when nothing changed")] = False,
     ) -> None:
         folder = RunFolder(runs_dir / run)
         with _readable_failures(stage, folder):
             context = stage_context(stage, folder, inputs_of, mesh_dir, workers)
+            context = replace(context, executor=executor)
             with _exclusive(folder, stage):
                 run_stage(context, build, force=force)
 

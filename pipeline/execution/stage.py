@@ -5,6 +5,7 @@ from pathlib import Path
 
 from pipeline.artifacts import Input, Provenance, package_version
 from pipeline.config import RunConfig
+from pipeline.execution.executors import Executor
 from pipeline.execution.freshness import Key
 
 
@@ -75,6 +76,7 @@ class StageContext:
     inputs: dict[str, Path]
     workers: int
     mesh_dir: Path | None
+    executor: Executor = "local"
 
     @property
     def output(self) -> Path:

@@ -21,7 +21,7 @@ from pipeline.gripper.quality import GraspQuality, WeightSummary, label_referenc
 from pipeline.gripper.solvers.structured import solve_into
 
 # Grasps whose wrench matrices (36 kB each) are held at a time: they stay in the L2 cache.
-_BLOCK = 16
+BLOCK = 16
 
 _INFEASIBLE = int(GraspStatus.INFEASIBLE)
 _NO_CONTACT = int(GraspStatus.NO_CONTACT)
@@ -109,14 +109,14 @@ def label_batch(
     """
     heights = np.ascontiguousarray(heights_m, dtype=np.float64)
     target_mask = np.ascontiguousarray(on_target, dtype=np.bool_)
-    batch = _empty_batch(len(heights), len(pad.vertices_xy_m))
+    batch = empty_batch(len(heights), len(pad.vertices_xy_m))
     if config.solver != "structured":
         for row in range(len(heights)):
             _store(batch, row, label_reference(pad, config, heights[row], target_mask[row]))
         return batch
     lower, upper = wrench_limit_ratios(config.friction)
     target = target_wrench()
-    size = min(_BLOCK, max(len(heights), 1))
+    size = min(BLOCK, max(len(heights), 1))
     draped = np.empty((size, len(pad.vertices_xy_m)))
     matrices = np.empty((size, 4, len(pad.triangles)))
     weights = np.empty((size, len(pad.triangles)))
@@ -132,7 +132,7 @@ def label_batch(
             pad.config.altitude_m,
             draped[:used],
         )
-        _assemble_into(
+        assemble_into(
             heights[rows],
             target_mask[rows],
             draped[:used],
@@ -184,7 +184,7 @@ def label_batch(
     return batch
 
 
-def _empty_batch(rows: int, vertices: int) -> LabelBatch:
+def empty_batch(rows: int, vertices: int) -> LabelBatch:
     return LabelBatch(
         q=np.zeros(rows),
         pressure=np.zeros(rows),
@@ -211,7 +211,7 @@ def _store(batch: LabelBatch, row: int, one: GraspQuality) -> None:
 
 
 @compiled
-def _assemble_into(
+def assemble_into(
     heights: Float[np.ndarray, "batch vertices"],
     on_target: Bool[np.ndarray, "batch vertices"],
     draped: Float[np.ndarray, "batch vertices"],

@@ -1,0 +1,1 @@
+"""What `make bench` measures: each module one subject, figures out, no files kept."""

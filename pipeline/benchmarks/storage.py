@@ -1,0 +1,169 @@
+"""Training samples written and read, by MCAP and by what others would use, uncompressed all.
+
+Every format holds the same batches of the same tensors, and reading touches every byte.
+"""
+
+import io
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import h5py
+import numpy as np
+import webdataset
+import zarr
+
+from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact
+from pipeline.artifacts.sample_messages import STORED_AS, Samples, sample_batch, samples_of
+from pipeline.benchmarks.clock import seconds_of
+from schemas.softgrip.v1.samples_pb2 import SampleBatch
+
+BATCH = 256
+REPEATS = 5
+PROVENANCE = Provenance("bench", "0" * 64, "0" * 64, "0" * 64, 0, (), "bench")
+
+Write = Callable[[Path, list[Samples]], None]
+Read = Callable[[Path], Iterator[dict[str, np.ndarray]]]
+
+
+def against_peers(samples: Samples, folder: Path) -> dict[str, dict[str, float]]:
+    """Format → MB/s and samples/s of writing and of reading, all in this one call."""
+    parts = [samples.take(slice(at, at + BATCH)) for at in range(0, len(samples), BATCH)]
+    megabytes = sum(array.nbytes for part in parts for array in arrays_of(part).values()) / 1e6
+    expected = checksum(arrays_of(part) for part in parts)
+    figures = {}
+    for name, (write, read) in FORMATS.items():
+        path = folder / name
+        writing = seconds_of(lambda w=write, p=path: w(p, parts), REPEATS)  # type: ignore[misc]
+        if checksum(read(path)) != expected:
+            raise AssertionError(f"{name} did not give back what was written")
+        reading = seconds_of(lambda r=read, p=path: checksum(r(p)), REPEATS)  # type: ignore[misc]
+        figures[name] = {
+            "write_mb_s": megabytes / writing,
+            "read_mb_s": megabytes / reading,
+            "write_samples_s": len(samples) / writing,
+            "read_samples_s": len(samples) / reading,
+        }
+    return figures
+
+
+def arrays_of(samples: Samples) -> dict[str, np.ndarray]:
+    """The tensors of a batch as they are stored."""
+    return {name: getattr(samples, name).astype(dtype) for name, dtype in STORED_AS.items()}
+
+
+def checksum(batches: Iterator[dict[str, np.ndarray]]) -> int:
+    """A sum over every byte, so that lazily mapped formats really read."""
+    total = 0
+    for batch in batches:
+        for array in batch.values():
+            total += int(np.ascontiguousarray(array).view(np.uint8).sum(dtype=np.uint64))
+    return total
+
+
+def write_mcap(path: Path, parts: list[Samples]) -> None:
+    """As the shards stage does."""
+    with ArtifactWriter(path, PROVENANCE, "none") as artifact:
+        for index, part in enumerate(parts):
+            artifact.write("/samples", sample_batch(part, ()), log_time_ns=index)
+
+
+def read_mcap(path: Path) -> Iterator[dict[str, np.ndarray]]:
+    """As training does."""
+    with open_artifact(path) as artifact:
+        for _, message in artifact.messages(SampleBatch):
+            yield _stored(samples_of(message))
+
+
+def write_hdf5(path: Path, parts: list[Samples]) -> None:
+    """A dataset a tensor, chunked by batch."""
+    with h5py.File(path, "w") as file:
+        first = arrays_of(parts[0])
+        count = sum(len(part) for part in parts)
+        made = {
+            name: file.create_dataset(
+                name, (count, *a.shape[1:]), a.dtype, chunks=(min(BATCH, count), *a.shape[1:])
+            )
+            for name, a in first.items()
+        }
+        for index, part in enumerate(parts):
+            for name, array in arrays_of(part).items():
+                made[name][index * BATCH : index * BATCH + len(part)] = array
+
+
+def read_hdf5(path: Path) -> Iterator[dict[str, np.ndarray]]:
+    """Batch by batch."""
+    with h5py.File(path) as file:
+        for at in range(0, len(file["quality"]), BATCH):
+            yield {name: file[name][at : at + BATCH] for name in STORED_AS}
+
+
+def write_zarr(path: Path, parts: list[Samples]) -> None:
+    """An array a tensor, chunked by batch."""
+    root = zarr.open_group(path, mode="w")
+    count = sum(len(part) for part in parts)
+    for name, array in arrays_of(parts[0]).items():
+        root.create_array(
+            name,
+            shape=(count, *array.shape[1:]),
+            chunks=(min(BATCH, count), *array.shape[1:]),
+            dtype=array.dtype,
+            compressors=None,
+        )
+    for index, part in enumerate(parts):
+        for name, array in arrays_of(part).items():
+            root[name][index * BATCH : index * BATCH + len(part)] = array
+
+
+def read_zarr(path: Path) -> Iterator[dict[str, np.ndarray]]:
+    """Batch by batch."""
+    root = zarr.open_group(path, mode="r")
+    for at in range(0, root["quality"].shape[0], BATCH):
+        yield {name: np.asarray(root[name][at : at + BATCH]) for name in STORED_AS}
+
+
+def write_webdataset(path: Path, parts: list[Samples]) -> None:
+    """A tar of .npy files, one group a batch."""
+    with webdataset.TarWriter(str(path)) as tar:
+        for index, part in enumerate(parts):
+            files = {f"{name}.npy": _npy(array) for name, array in arrays_of(part).items()}
+            tar.write({"__key__": f"{index:06d}", **files})
+
+
+def read_webdataset(path: Path) -> Iterator[dict[str, np.ndarray]]:
+    """Group by group, decoded by its own pipeline."""
+    for group in webdataset.WebDataset(str(path), shardshuffle=False).decode():
+        yield {name: group[f"{name}.npy"] for name in STORED_AS}
+
+
+def write_numpy(path: Path, parts: list[Samples]) -> None:
+    """A .npy file a tensor: the floor that nothing with an index can reach."""
+    path.mkdir(exist_ok=True)
+    for name in STORED_AS:
+        np.save(path / f"{name}.npy", np.concatenate([arrays_of(part)[name] for part in parts]))
+
+
+def read_numpy(path: Path) -> Iterator[dict[str, np.ndarray]]:
+    """Memory maps, batch by batch."""
+    maps = {name: np.load(path / f"{name}.npy", mmap_mode="r") for name in STORED_AS}
+    for at in range(0, len(maps["quality"]), BATCH):
+        yield {name: array[at : at + BATCH] for name, array in maps.items()}
+
+
+def _stored(samples: Samples) -> dict[str, np.ndarray]:
+    """Tensors as read: no conversion, as the views have the stored type."""
+    return {name: getattr(samples, name) for name in STORED_AS}
+
+
+def _npy(array: np.ndarray) -> bytes:
+    buffer = io.BytesIO()
+    np.save(buffer, array)
+    return buffer.getvalue()
+
+
+FORMATS: dict[str, tuple[Write, Read]] = {
+    "mcap": (write_mcap, read_mcap),
+    "hdf5": (write_hdf5, read_hdf5),
+    "zarr": (write_zarr, read_zarr),
+    "webdataset": (write_webdataset, read_webdataset),
+    "numpy": (write_numpy, read_numpy),
+}
