@@ -13,12 +13,14 @@ LIMIT_NAMES = tuple(f"{axis} {side}" for side in ("upper", "lower") for axis in 
 def wrench_limit_ratios(
     friction: float,
 ) -> tuple[Float[np.ndarray, " 4"], Float[np.ndarray, " 4"]]:
-    """Lower and upper bound of GW over F_v: Eq. (8)-(11).
+    """Lower and upper bound of GW over F_v, an equation a row.
 
-    The torque of G is divided by r_G, so r_G drops out of Eq. (11).
+    Eq. (8): |F_x| within sqrt(3)/3 mu F_v. Eq. (9): |F_y| likewise. Eq. (10): F_z between
+    nothing and F_v. Eq. (11): |T_z| within sqrt(3)/3 mu r_G F_v. The torque of
+    G is divided by r_G, so r_G drops out of Eq. (11).
     """
     side = math.sqrt(3) / 3 * friction
-    lower = np.array([-side, -side, 0.0, -side])  # Eq. (8), (9), (10), (11)
+    lower = np.array([-side, -side, 0.0, -side])
     upper = np.array([side, side, 1.0, side])
     return lower, upper
 

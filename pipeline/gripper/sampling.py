@@ -85,6 +85,8 @@ def propose(
 ) -> Candidates:
     """First round: ``count`` grasps of one object, contacts uniform over what is seen of it.
 
+    S-1.04 draws the contact c, S-1.05 the approach d_G, S-1.06 the spin about it.
+
     surface : points of that object alone, at least one.
     """
     at = rng.integers(len(surface.points_m), size=count)

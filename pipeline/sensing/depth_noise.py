@@ -2,9 +2,10 @@
 
 Time of flight: Kinect v2's axial spread of 1-2 mm within a metre, growing with distance
 and incidence (Wasenmueller and Stricker, ACCV Workshops 2016). Structured light: axial
-spread 1.2 mm + 1.9 mm (z/m - 0.4)^2 (Nguyen, Izadi and Lovell, 3DIMPVT 2012). Lidar: a
-few millimetres at all ranges (the L515's data sheet gives 2.5 mm at 1 m). All of them see
-nothing at grazing incidence, and little along depth edges.
+spread 1.2 mm + 1.9 mm (z/m - 0.4)^2 (Nguyen, Izadi and Lovell, 3DIMPVT 2012). Lidar: the
+line through the L515 data sheet's bounds on the spread, 2.5 mm at 1 m and 15.5 mm at 9 m
+(Intel, 2020). All of them see nothing at grazing incidence, and little along depth edges;
+the angles and shares of that are our choice.
 """
 
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from pipeline.config.grasps import SensingConfig
+from pipeline.config.grasps import Noise, SensingConfig
 from pipeline.sensing.view import CameraView
 
 
@@ -32,9 +33,9 @@ class NoiseModel:
     edge_loss: float
 
 
-NOISE_MODELS = {
+NOISE_MODELS: dict[Noise, NoiseModel] = {
     "time-of-flight": NoiseModel(0.0008, 0.0007, 0.0, 1.40, 0.02, 0.5),
-    "lidar": NoiseModel(0.0018, 0.0005, 0.0, 1.31, 0.02, 0.5),
+    "lidar": NoiseModel(0.000875, 0.001625, 0.0, 1.31, 0.02, 0.5),
     "structured-light": NoiseModel(0.0012, 0.0, 0.0019, 1.22, 0.01, 0.8),
 }
 _STEEPEST = 0.05  # cosine below which the spread grows no more

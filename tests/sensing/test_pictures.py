@@ -8,16 +8,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+from scipy import ndimage
 
 from pipeline.clutter.scene import ClutterScene, PlacedObject
 from pipeline.config import CameraConfig, ObjectsConfig, ScenesConfig, SensingConfig
+from pipeline.config.grasps import Noise
 from pipeline.errors import MachineError
 from pipeline.geometry.catalogue import CatalogueObject, MeasuredObject, finish_object
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.mesh_files import MeshSource
 from pipeline.geometry.shape import nsvr, shape_class
 from pipeline.sensing.cameras import cameras_of, points_of_depth
-from pipeline.sensing.depth_noise import disturb
+from pipeline.sensing.depth_noise import NOISE_MODELS, disturb, incidence_rad
 from pipeline.sensing.rendering import RayRenderer
 from pipeline.sensing.sapien_rendering import SapienRenderer
 from pipeline.sensing.sub_cloud import sub_clouds
@@ -102,6 +104,47 @@ def test_noise_has_its_spread_and_its_seed(view: CameraView) -> None:
     # 0.8 mm + 0.7 mm/m at 0.9 m, over cosines between 0.8 and 1.
     assert 0.0012 < error.std() < 0.0022
     assert abs(error.mean()) < 1e-4
+
+
+@pytest.mark.parametrize("noise", sorted(NOISE_MODELS))
+def test_every_sensor_has_its_published_spread(noise: Noise, view: CameraView) -> None:
+    """In units of the model's own spread at each pixel, the error is standard normal."""
+    model = NOISE_MODELS[noise]
+    noisy = disturb(view, SensingConfig(noise=noise), np.random.default_rng(5))
+    depth = view.depth_m.astype(np.float64)
+    flat = (view.segmentation == 0) & (noisy > 0)
+    sigma = model.floor_m + model.linear * depth + model.quadratic_1_m * (depth - 0.4) ** 2
+    units = ((noisy - depth) * np.cos(incidence_rad(view)) / sigma)[flat]
+    assert units.std() == pytest.approx(1.0, abs=0.02)
+    assert units.mean() == pytest.approx(0.0, abs=0.02)
+
+
+def test_published_spreads_at_their_distances() -> None:
+    lidar, light = NOISE_MODELS["lidar"], NOISE_MODELS["structured-light"]
+    assert lidar.floor_m + lidar.linear * 1.0 == pytest.approx(0.0025)
+    assert lidar.floor_m + lidar.linear * 9.0 == pytest.approx(0.0155)
+    assert light.floor_m + light.quadratic_1_m * (1.4 - 0.4) ** 2 == pytest.approx(0.0031)
+
+
+@pytest.mark.parametrize("noise", sorted(NOISE_MODELS))
+def test_no_sensor_sees_at_grazing_incidence(noise: Noise, view: CameraView) -> None:
+    noisy = disturb(view, SensingConfig(noise=noise), np.random.default_rng(5))
+    grazing = incidence_rad(view) > NOISE_MODELS[noise].grazing_rad
+    assert grazing.any()
+    assert not noisy[grazing].any()
+    assert (noisy[~grazing & (view.depth_m > 0)] > 0).mean() > 0.95
+
+
+def test_incidence_on_the_table_is_the_angle_to_its_normal(view: CameraView) -> None:
+    points, rows, columns = points_of_depth(view.depth_m, view.camera, 1)
+    ray = points - view.camera.world_from_camera[:3, 3]
+    expected = np.arccos(-ray[:, 2] / np.linalg.norm(ray, axis=1))
+    found = incidence_rad(view)[rows, columns]
+    table = ndimage.binary_erosion(view.segmentation == 0, iterations=3)[rows, columns]
+    inner = table & (rows > 2) & (rows < 420) & (columns > 2) & (columns < 508)
+    # The picture's own edge of the table is a step too.
+    smooth = inner & (np.abs(points[:, :2]).max(axis=1) < 0.55)
+    np.testing.assert_allclose(found[smooth], expected[smooth], atol=2e-3)
 
 
 def test_no_noise_is_the_picture_itself(view: CameraView) -> None:

@@ -46,7 +46,7 @@ def solve(problem: QualityProblem) -> QpSolution:
     settings.verbose = False
     settings.max_iter = problem.max_iterations
     settings.tol_gap_abs = 1e-13
-    settings.tol_gap_rel = 1e-10
+    settings.tol_gap_rel = 1e-12
     settings.tol_feas = 1e-10
     cones = [clarabel.ZeroConeT(5), clarabel.NonnegativeConeT(8 + 2 * n)]
     answer = clarabel.DefaultSolver(
