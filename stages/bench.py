@@ -138,7 +138,7 @@ def phases(bench: Bench) -> dict[str, object]:
     clearance_m = config.grasps.clearance_m
     seconds = labelling.phase_seconds(*common, frames, body, clearance_m)
     laps = Laps()
-    measured = disturb(view, config.sensing, rng)
+    measured = disturb(view, rng)
     sub_clouds(measured, view.camera, frames, config.sensing, pad.radius_m)
     laps.lap("sub cloud")
     batches = synthesize(scene, bench.meshes, config, 1024, rng)
@@ -265,7 +265,7 @@ def control_steps(bench: Bench) -> dict[str, object]:
         export_onnx_bytes(GaCnn(bench.config.network)), min(CONTROL_THREADS, os.cpu_count() or 1)
     )
     scene = bench.scenes[-1]
-    depth = disturb(scene.views[0], bench.config.sensing, np.random.default_rng(0))
+    depth = disturb(scene.views[0], np.random.default_rng(0))
     found = control.step_ms(scene, depth, network, bench.config, CONTROL_STEPS)
     return {
         "control_step_p95_ms": round(found["p95"], 2),

@@ -31,8 +31,7 @@ from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.network.export import OnnxPredictor
 from pipeline.recording.evaluate import blueprint, show_attempts
 from pipeline.recording.recording import recording, spread
-from pipeline.sensing.cameras import cameras_of
-from pipeline.sensing.rendering import SceneRenderer, new_renderer
+from pipeline.sensing.rendering import Renderer, new_renderer
 from pipeline.simulation.picking import run_clutter
 from schemas.softgrip.v1.evaluation_pb2 import Attempt, LevelResult
 from stages.graph import EVALUATE, RUNS_DIR, inputs_of
@@ -124,9 +123,9 @@ def network(checkpoint: Path) -> OnnxPredictor:
 
 
 @lru_cache(maxsize=1)
-def renderer_of(config: RunConfig) -> SceneRenderer:
-    """The renderer of this worker, with the first viewpoint alone."""
-    return new_renderer(config.scenes, cameras_of(config.camera)[:1])
+def renderer_of(config: RunConfig) -> Renderer:
+    """The renderer of this worker; its first frame costs seconds, so it is kept."""
+    return new_renderer(config.cameras.renderer, config.scenes)
 
 
 def read_attempts(path: Path) -> list[Attempt]:

@@ -20,7 +20,7 @@ from pipeline.execution.stage import RunFolder, Stage
 from pipeline.geometry.mesh_files import list_mesh_files
 
 OBJECTS = Stage("objects", ("seed", "objects", "split", "recording.objects"))
-SCENES = Stage("scenes", ("seed", "scenes", "camera", "recording.scenes"), ("objects",))
+SCENES = Stage("scenes", ("seed", "scenes", "cameras", "recording.scenes"), ("objects",))
 GRASPS = Stage(
     "grasps",
     ("seed", "gripper", "sensing", "grasps", "recording.grasps"),
@@ -31,7 +31,7 @@ SHARDS = Stage("shards", ("seed", "shards", "recording.clouds"), ("grasps",), sh
 TRAIN = Stage("train", ("seed", "network", "train", "gripper.pad", "recording.clouds"), ("shards",))
 EVALUATE = Stage(
     "evaluate",
-    ("seed", "evaluate", "scenes", "camera", "gripper", "sensing", "recording.attempts"),
+    ("seed", "evaluate", "scenes", "cameras", "gripper", "sensing", "recording.attempts"),
     ("objects", "scenes", "train"),
 )
 STAGES = {stage.name: stage for stage in (OBJECTS, SCENES, GRASPS, SHARDS, TRAIN, EVALUATE)}

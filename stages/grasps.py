@@ -204,7 +204,7 @@ def grasps_of_view(
     kept, probability = flattened(labels.q, wanted, config.grasps.balance, rng)
     candidates, labels = candidates.take(kept), labels.take(kept)
     # S-1.13 - S-1.15: the camera's picture, disturbed, transformed, desampled.
-    measured = disturb(view, config.sensing, rng)
+    measured = disturb(view, rng) if config.sensing.disturbed else view.depth_m
     cloud, mask = sub_clouds(
         measured,
         view.camera,
@@ -297,7 +297,7 @@ def visible_surface(view: CameraView, rays: RayScene, body_ids: np.ndarray) -> V
     if not seen.any():
         raise SceneError(
             f"Camera {view.camera.name} sees no object",
-            "Change camera.elevations_rad or azimuths_rad",
+            "Change cameras.static.elevations_rad or azimuths_rad",
         )
     points = origin + hits.distance_m[seen, None] * directions[seen]
     return VisibleSurface(points, rays.normals_at(hits)[seen], body[seen])

@@ -1,6 +1,8 @@
 """Stage 1, objects: meshes in → repaired, rescaled, classed by NSVR, cut into convex parts."""
 
+import difflib
 from collections import Counter
+from fnmatch import fnmatchcase
 from functools import partial
 from pathlib import Path
 
@@ -9,7 +11,7 @@ from loguru import logger
 from pipeline.artifacts import ArtifactWriter
 from pipeline.artifacts.object_messages import REFUSED_TOPIC, TOPIC, object_message
 from pipeline.config import ObjectsConfig
-from pipeline.errors import MeshError
+from pipeline.errors import ConfigError, MeshError
 from pipeline.execution import (
     StageContext,
     Summary,
@@ -40,6 +42,7 @@ def build(stage: StageContext) -> Summary:
     classes = {item.source.name: item.shape_class for item in measured}
     if not classes:
         raise MeshError("Not one mesh could be used", "See the reasons above, or unset MESH_DIR")
+    check_transparent(config, sorted(classes))
     chosen = choose_subset(classes, config.limit, seed)
     cache = stage.folder.path.parent / ".cache" / "convex_parts"
     finish = partial(finished, config=config, seed=seed, cache=cache)
@@ -51,6 +54,17 @@ def build(stage: StageContext) -> Summary:
     )
     publish(stage, objects, dict(split), refused)
     return summary(objects, dict(split), refused)
+
+
+def check_transparent(config: ObjectsConfig, names: list[str]) -> None:
+    """Raise ConfigError for a pattern of ``objects.transparent`` that no object has."""
+    for pattern in config.transparent:
+        if not any(fnmatchcase(name, pattern) for name in names):
+            near = difflib.get_close_matches(pattern, names, n=3) or names[:3]
+            raise ConfigError(
+                f"objects.transparent names {pattern!r}, and no object is called so",
+                f"Names are, for instance: {', '.join(near)}",
+            )
 
 
 def measure(stage: StageContext) -> tuple[list[MeasuredObject], list[RefusedMesh]]:
@@ -119,6 +133,7 @@ def summary(
         "objects": len(objects),
         "by_class": dict(sorted(Counter(str(item.shape_class) for item in objects).items())),
         "by_split": dict(sorted(Counter(split.values()).items())),
+        "transparent": sorted(item.name for item in objects if item.material == "transparent"),
         "repaired": sum(bool(item.repairs) for item in objects),
         "nsvr": {item.name: round(item.nsvr, 6) for item in objects},
         "left_out": [{"source": r.source, "reason": r.reason, "remedy": r.remedy} for r in refused],

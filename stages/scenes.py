@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
+import numpy as np
 from loguru import logger
 
 from pipeline.artifacts import ArtifactWriter, Provenance
@@ -21,6 +22,7 @@ from pipeline.execution import (
     StageContext,
     Summary,
     derive_seed,
+    generator,
     progress,
     run_in_order,
     stage_command,
@@ -28,8 +30,8 @@ from pipeline.execution import (
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.recording.recording import recording, spread
 from pipeline.recording.scenes import blueprint, show_scene
-from pipeline.sensing.cameras import cameras_of
-from pipeline.sensing.rendering import SceneRenderer, new_renderer
+from pipeline.sensing.cameras import scene_cameras
+from pipeline.sensing.rendering import Renderer, new_renderer, rendered
 from stages.graph import SCENES, inputs_of
 
 
@@ -100,7 +102,10 @@ def make_scene(job: SceneJob) -> Path:
     scene = build_clutter(job.scene_id, job.level, job.split, pool, job.config.scenes, seed)
     objects = {item.name: item for item in pool}
     renderer = renderer_of(job.config)
-    seen = renderer.rendered(scene, objects)
+    rng = generator(job.config.seed, "cameras", job.scene_id)
+    centres = np.array([placed.world_from_object[:3, 3] for placed in scene.objects])
+    cameras = scene_cameras(job.config.cameras, centres, rng)
+    seen = rendered(scene, objects, cameras, renderer)
     with ArtifactWriter(job.path, job.provenance) as artifact:
         write_scene(artifact, 0, seen, renderer.name)
     return job.path
@@ -113,9 +118,9 @@ def catalogue(objects: Path) -> dict[str, tuple[CatalogueObject, str]]:
 
 
 @lru_cache(maxsize=1)
-def renderer_of(config: RunConfig) -> SceneRenderer:
+def renderer_of(config: RunConfig) -> Renderer:
     """The renderer of this worker; its first frame costs seconds, so it is kept."""
-    return new_renderer(config.scenes, cameras_of(config.camera))
+    return new_renderer(config.cameras.renderer, config.scenes)
 
 
 def publish(stage: StageContext, parts: list[Path]) -> None:

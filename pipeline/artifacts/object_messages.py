@@ -7,7 +7,7 @@ import numpy as np
 
 from pipeline.artifacts.reading import open_artifact
 from pipeline.artifacts.tensors import from_tensor, to_tensor
-from pipeline.geometry.catalogue import CatalogueObject
+from pipeline.geometry.catalogue import CatalogueObject, Material
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.mesh_files import UnitSource
 from pipeline.geometry.shape import ShapeClass
@@ -37,6 +37,7 @@ def object_message(item: CatalogueObject, split: str) -> objects_pb2.CatalogueOb
         inertia_kg_m2=to_tensor(item.inertia_kg_m2),
         mesh=_mesh_message(item.mesh),
         convex_parts=[_mesh_message(part) for part in item.convex_parts],
+        material=item.material,
     )
 
 
@@ -60,6 +61,7 @@ def object_of(message: objects_pb2.CatalogueObject) -> CatalogueObject:
         inertia_kg_m2=from_tensor(message.inertia_kg_m2),
         mesh=_mesh(message.mesh),
         convex_parts=tuple(_mesh(part) for part in message.convex_parts),
+        material=cast(Material, message.material),
     )
 
 

@@ -1,13 +1,14 @@
 """Clutter scenes ↔ softgrip.v1.Scene, their images on foxglove topics beside it.
 
 Scene i lies at log time i seconds: its record on ``/scenes``, and for every
-viewpoint colour, depth and segmentation as foxglove.RawImage, the camera as
+viewpoint colour, depth, segmentation and normals as foxglove.RawImage, the camera as
 foxglove.CameraCalibration, and all poses as foxglove.FrameTransforms, so that
 a viewer shows the file as it is.
 """
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
@@ -21,6 +22,7 @@ from pipeline.artifacts.tensors import from_tensor, to_tensor
 from pipeline.artifacts.writing import ArtifactWriter
 from pipeline.clutter.levels import level_of
 from pipeline.clutter.scene import ClutterScene, PlacedObject
+from pipeline.config.cameras import DepthSensor
 from pipeline.errors import ArtifactError
 from pipeline.geometry.transforms import position_quaternion
 from pipeline.sensing.cameras import PinholeCamera
@@ -32,7 +34,13 @@ NS_PER_SCENE = 1_000_000_000
 WORLD_FRAME = "world"
 
 # Name of an image → (encoding of foxglove.RawImage, dtype).
-IMAGES = {"depth": ("32FC1", "<f4"), "colour": ("rgb8", "u1"), "segmentation": ("16UC1", "<u2")}
+IMAGES = {
+    "depth": ("32FC1", "<f4"),
+    "colour": ("rgb8", "u1"),
+    "segmentation": ("16UC1", "<u2"),
+    "normals": ("rgb8", "u1"),
+    "behind": ("32FC1", "<f4"),
+}
 
 
 def write_scene(artifact: ArtifactWriter, index: int, scene: ClutterScene, renderer: str) -> None:
@@ -76,6 +84,9 @@ def scene_message(scene: ClutterScene, renderer: str) -> scenes_pb2.Scene:
                 height_px=view.camera.height_px,
                 intrinsics=to_tensor(view.camera.intrinsics),
                 world_from_camera=to_tensor(view.camera.world_from_camera),
+                sensor=view.camera.sensor,
+                near_m=view.camera.near_m,
+                far_m=view.camera.far_m,
             )
             for view in scene.views
         ],
@@ -127,6 +138,9 @@ def _view(artifact: Artifact, viewpoint: scenes_pb2.Viewpoint, time_ns: int) -> 
         height_px=viewpoint.height_px,
         intrinsics=from_tensor(viewpoint.intrinsics),
         world_from_camera=from_tensor(viewpoint.world_from_camera),
+        sensor=cast(DepthSensor, viewpoint.sensor),
+        near_m=viewpoint.near_m,
+        far_m=viewpoint.far_m,
     )
     images = {}
     for name, (encoding, dtype) in IMAGES.items():
@@ -137,17 +151,28 @@ def _view(artifact: Artifact, viewpoint: scenes_pb2.Viewpoint, time_ns: int) -> 
                     f"{artifact.path}: {topic} is {raw.encoding}, expected {encoding}",
                     "Make the scenes again",
                 )
-            shape = (raw.height, raw.width) + ((3,) if name == "colour" else ())
+            shape = (raw.height, raw.width) + ((3,) if encoding == "rgb8" else ())
             images[name] = np.frombuffer(raw.data, dtype).reshape(shape)
-    return CameraView(camera, images["depth"], images["colour"], images["segmentation"])
+    return CameraView(
+        camera=camera,
+        depth_m=images["depth"],
+        colour=images["colour"],
+        segmentation=images["segmentation"],
+        normals=images["normals"],
+        behind_m=images.get("behind"),
+    )
 
 
 def _images(view: CameraView) -> dict[str, np.ndarray]:
-    return {
+    images = {
         "depth": view.depth_m,
         "colour": view.colour,
         "segmentation": view.segmentation,
+        "normals": view.normals,
     }
+    if view.behind_m is not None:
+        images["behind"] = view.behind_m
+    return images
 
 
 def _raw(image: np.ndarray, name: str, camera: PinholeCamera, time_ns: int) -> RawImage:

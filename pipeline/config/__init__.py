@@ -1,5 +1,11 @@
 """One frozen, validated tree of every number a run depends on."""
 
+from pipeline.config.cameras import (
+    CamerasConfig,
+    DepthSensor,
+    StaticCameraConfig,
+    WristCameraConfig,
+)
 from pipeline.config.evaluation import (
     EvaluateConfig,
     LiftConfig,
@@ -10,13 +16,14 @@ from pipeline.config.evaluation import (
 from pipeline.config.grasps import GraspsConfig, GripperConfig, PadConfig, SensingConfig
 from pipeline.config.learning import NetworkConfig, ShardsConfig, TrainConfig
 from pipeline.config.objects import ConvexPartsConfig, ObjectsConfig, SplitConfig
-from pipeline.config.scenes import CameraConfig, ClutterCounts, ScenesConfig
+from pipeline.config.scenes import ClutterCounts, ScenesConfig
 from pipeline.config.tree import RunConfig, load_run_config, section_digest
 
 __all__ = [
-    "CameraConfig",
+    "CamerasConfig",
     "ClutterCounts",
     "ConvexPartsConfig",
+    "DepthSensor",
     "EvaluateConfig",
     "GraspsConfig",
     "GripperConfig",
@@ -31,8 +38,10 @@ __all__ = [
     "SensingConfig",
     "ShardsConfig",
     "SplitConfig",
+    "StaticCameraConfig",
     "SuctionConfig",
     "TrainConfig",
+    "WristCameraConfig",
     "load_run_config",
     "section_digest",
 ]

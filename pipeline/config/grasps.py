@@ -79,13 +79,10 @@ class GraspsConfig(Section):
     samples_per_message: int = Field(256, ge=1, le=8192)
 
 
-Noise = Literal["none", "time-of-flight", "lidar", "structured-light"]
-
-
 class SensingConfig(Section):
     """From a rendered depth image to the sample's cloud: S-1.13 - S-1.15."""
 
-    noise: Noise = Field("time-of-flight", description="depth noise model of the Disturb step")
+    disturbed: bool = Field(True, description="whether the sensors' noise is added; S-1.15")
     grid_cells: int = Field(24, ge=8, le=128, description="cells a side; Supplement III: 24")
     grid_side_m: float = Field(0.06, gt=0, description="side of the square around the pad [m]")
     grid_depth_m: float = Field(

@@ -44,6 +44,9 @@ class ObjectsConfig(Section):
         0.16, gt=0, description="largest longest-extent after rescaling [m]; Supplement III"
     )
     density_kg_m3: float = Field(300.0, gt=0, description="mass from the closed mesh [kg/m3]")
+    transparent: tuple[str, ...] = Field(
+        (), description="names (with * and ?) of objects that depth cameras see through; VIII"
+    )
     convex: ConvexPartsConfig = ConvexPartsConfig()
 
     @model_validator(mode="after")

@@ -1,4 +1,4 @@
-"""[scenes] and [camera]: clutter, settling, and what the cameras are."""
+"""[scenes]: clutter of the nine levels and how it comes to rest."""
 
 from typing import Self
 
@@ -48,27 +48,4 @@ class ScenesConfig(Section):
             raise ValueError(f"levels go from 1 to 9 (Table II), got {unknown}")
         if self.workspace_side_m > self.table_side_m:
             raise ValueError("workspace_side_m must not exceed table_side_m")
-        return self
-
-
-class CameraConfig(Section):
-    """A pinhole depth camera looking at the table; defaults: Kinect v2 depth camera."""
-
-    width_px: int = Field(512, ge=16, le=4096, description="Kinect v2 depth image: 512")
-    height_px: int = Field(424, ge=16, le=4096, description="Kinect v2 depth image: 424")
-    vertical_fov_rad: float = Field(1.0472, gt=0.05, lt=2.8, description="Kinect v2: 60 deg [rad]")
-    distance_m: float = Field(0.90, gt=0.05, description="from the clutter's centre [m]")
-    elevations_rad: tuple[float, ...] = Field(
-        (1.30,), min_length=1, description="angle above the table, one a viewpoint [rad]"
-    )
-    azimuths_rad: tuple[float, ...] = Field(
-        (0.0,), min_length=1, description="angle about world z, one a viewpoint [rad]"
-    )
-    near_m: float = Field(0.05, gt=0, description="nearest measurable depth [m]")
-    far_m: float = Field(4.5, gt=0, description="farthest measurable depth; Kinect v2: 4.5 [m]")
-
-    @model_validator(mode="after")
-    def _viewpoints_pair_up(self) -> Self:
-        if len(self.elevations_rad) != len(self.azimuths_rad):
-            raise ValueError("elevations_rad and azimuths_rad need the same length")
         return self

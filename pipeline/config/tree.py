@@ -15,11 +15,12 @@ from typing import Any
 
 from pydantic import Field, ValidationError
 
+from pipeline.config.cameras import CamerasConfig
 from pipeline.config.evaluation import EvaluateConfig, RecordingConfig
 from pipeline.config.grasps import GraspsConfig, GripperConfig, SensingConfig
 from pipeline.config.learning import NetworkConfig, ShardsConfig, TrainConfig
 from pipeline.config.objects import ObjectsConfig, SplitConfig
-from pipeline.config.scenes import CameraConfig, ScenesConfig
+from pipeline.config.scenes import ScenesConfig
 from pipeline.config.section import Section
 from pipeline.errors import ConfigError
 
@@ -31,7 +32,7 @@ class RunConfig(Section):
     objects: ObjectsConfig = ObjectsConfig()
     split: SplitConfig = SplitConfig()
     scenes: ScenesConfig = ScenesConfig()
-    camera: CameraConfig = CameraConfig()
+    cameras: CamerasConfig = CamerasConfig()
     gripper: GripperConfig = GripperConfig()
     sensing: SensingConfig = SensingConfig()
     grasps: GraspsConfig = GraspsConfig()

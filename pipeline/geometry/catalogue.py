@@ -1,7 +1,9 @@
 """The object catalogue: from a source mesh to everything later stages need of an object."""
 
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -20,6 +22,8 @@ from pipeline.geometry.shape import (
     surface_area,
     volume,
 )
+
+Material = Literal["opaque", "transparent"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +65,8 @@ class CatalogueObject:
     mesh: Mesh
     convex_parts: tuple[Mesh, ...]
     """Closed convex collision shapes, in the object's frame."""
+    material: Material
+    """What depth cameras make of it."""
 
 
 def measure_object(source: MeshSource, config: ObjectsConfig) -> MeasuredObject:
@@ -102,7 +108,14 @@ def finish_object(
         inertia_kg_m2=mass.inertia_kg_m2,
         mesh=mesh,
         convex_parts=convex_parts(mesh, config.convex, cache_dir),
+        material=material_of(source.name, config),
     )
+
+
+def material_of(name: str, config: ObjectsConfig) -> Material:
+    """Transparent where a pattern of ``objects.transparent`` matches the object's name."""
+    matched = any(fnmatchcase(name, pattern) for pattern in config.transparent)
+    return "transparent" if matched else "opaque"
 
 
 def prepare_object(

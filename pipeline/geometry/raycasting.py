@@ -78,6 +78,23 @@ class RayScene:
         normals[hit] = cross / np.linalg.norm(cross, axis=1, keepdims=True)
         return normals
 
+    def barycentric_at(
+        self, hits: RayHits, points_m: Float[np.ndarray, "n 3"]
+    ) -> Float[np.ndarray, "n 3"]:
+        """Weights of the hit triangle's corners at each point on it; NaN where nothing was hit."""
+        weights = np.full((len(hits.body), 3), np.nan)
+        hit = hits.body >= 0
+        a, b, c = self._corners[self._first_face[hits.body[hit]] + hits.triangle[hit]].swapaxes(
+            0, 1
+        )
+        doubled = np.cross(b - a, c - a)
+        area = (doubled**2).sum(axis=1)
+        point = points_m[hit]
+        weights[hit, 1] = (np.cross(point - a, c - a) * doubled).sum(axis=1) / area
+        weights[hit, 2] = (np.cross(b - a, point - a) * doubled).sum(axis=1) / area
+        weights[hit, 0] = 1.0 - weights[hit, 1] - weights[hit, 2]
+        return weights
+
     def cast(
         self, origins_m: Float[np.ndarray, "n 3"], directions: Float[np.ndarray, "n 3"]
     ) -> RayHits:

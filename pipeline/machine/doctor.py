@@ -16,11 +16,11 @@ ROOT = Path(__file__).resolve().parents[2]
 OLDEST_PYTHON = (3, 11)
 FREE_GIB_WANTED = 5
 RENDER_TRIAL = """
-from pipeline.config import CameraConfig, ScenesConfig
-from pipeline.sensing.cameras import cameras_of
+from pipeline.config import ScenesConfig, StaticCameraConfig
+from pipeline.sensing.cameras import static_cameras
 from pipeline.sensing.sapien_rendering import rendered_table
 
-seen = rendered_table(ScenesConfig(), cameras_of(CameraConfig())[0])
+seen = rendered_table(ScenesConfig(), static_cameras(StaticCameraConfig())[0])
 raise SystemExit(0 if (seen.depth_m > 0).any() else "the table is not in the picture")
 """
 TRIAL_TIMEOUT_S = 120

@@ -6,7 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pipeline.config.scenes import CameraConfig
+from pipeline.config.cameras import (
+    CamerasConfig,
+    DepthCameraConfig,
+    DepthSensor,
+    StaticCameraConfig,
+    WristCameraConfig,
+)
 from pipeline.geometry.transforms import look_at, rotate_vectors, transform_points
 
 _TARGET_M = np.array([0.0, 0.0, 0.02])  # the middle of the table, a little above it
@@ -17,6 +23,7 @@ class PinholeCamera:
     """A camera C with its pose P_C (S-1.13).
 
     intrinsics : (3, 3) pixels. world_from_camera : (4, 4) pose of CCS in WCS.
+    sensor : how it errs. near_m, far_m : the depths it can measure.
     """
 
     name: str
@@ -24,10 +31,62 @@ class PinholeCamera:
     height_px: int
     intrinsics: Float[np.ndarray, "3 3"]
     world_from_camera: Float[np.ndarray, "4 4"]
+    sensor: DepthSensor
+    near_m: float
+    far_m: float
 
 
-def cameras_of(config: CameraConfig) -> tuple[PinholeCamera, ...]:
+def scene_cameras(
+    config: CamerasConfig, objects_m: Float[np.ndarray, "n 3"], rng: np.random.Generator
+) -> tuple[PinholeCamera, ...]:
+    """Every viewpoint of a scene: the static ones, then the wrist's above objects of it.
+
+    objects_m : centres of the scene's objects in WCS.
+    """
+    return (*static_cameras(config.static), *wrist_cameras(config.wrist, objects_m, rng))
+
+
+def static_cameras(config: StaticCameraConfig) -> tuple[PinholeCamera, ...]:
     """One camera a viewpoint, each looking at the middle of the table."""
+    places = zip(config.elevations_rad, config.azimuths_rad, strict=True)
+    return tuple(
+        camera_at(f"static_{number}", config, _TARGET_M, config.distance_m, elevation, azimuth)
+        for number, (elevation, azimuth) in enumerate(places)
+    )
+
+
+def wrist_cameras(
+    config: WristCameraConfig, objects_m: Float[np.ndarray, "n 3"], rng: np.random.Generator
+) -> tuple[PinholeCamera, ...]:
+    """The wrist's viewpoints: each above another object while there are some, from any side."""
+    if config.viewpoints == 0 or len(objects_m) == 0:
+        return ()
+    rounds = -(-config.viewpoints // len(objects_m))
+    order = np.concatenate([rng.permutation(len(objects_m)) for _ in range(rounds)])
+    elevations = rng.uniform(config.elevation_min_rad, config.elevation_max_rad, config.viewpoints)
+    azimuths = rng.uniform(-math.pi, math.pi, config.viewpoints)
+    return tuple(
+        camera_at(
+            f"wrist_{number}",
+            config,
+            objects_m[order[number]],
+            config.distance_m,
+            float(elevations[number]),
+            float(azimuths[number]),
+        )
+        for number in range(config.viewpoints)
+    )
+
+
+def camera_at(
+    name: str,
+    config: DepthCameraConfig,
+    target_m: Float[np.ndarray, " 3"],
+    distance_m: float,
+    elevation_rad: float,
+    azimuth_rad: float,
+) -> PinholeCamera:
+    """A camera that looks at a point in WCS from a distance; elevation above the horizontal."""
     focal_px = config.height_px / 2 / math.tan(config.vertical_fov_rad / 2)
     intrinsics = np.array(
         [
@@ -36,21 +95,23 @@ def cameras_of(config: CameraConfig) -> tuple[PinholeCamera, ...]:
             [0.0, 0.0, 1.0],
         ]
     )
-    cameras = []
-    for number, (elevation, azimuth) in enumerate(
-        zip(config.elevations_rad, config.azimuths_rad, strict=True)
-    ):
-        towards = np.array(
-            [
-                math.cos(elevation) * math.cos(azimuth),
-                math.cos(elevation) * math.sin(azimuth),
-                math.sin(elevation),
-            ]
-        )
-        pose = look_at(_TARGET_M + config.distance_m * towards, _TARGET_M)
-        name = f"static_{number}"
-        cameras.append(PinholeCamera(name, config.width_px, config.height_px, intrinsics, pose))
-    return tuple(cameras)
+    towards = np.array(
+        [
+            math.cos(elevation_rad) * math.cos(azimuth_rad),
+            math.cos(elevation_rad) * math.sin(azimuth_rad),
+            math.sin(elevation_rad),
+        ]
+    )
+    return PinholeCamera(
+        name=name,
+        width_px=config.width_px,
+        height_px=config.height_px,
+        intrinsics=intrinsics,
+        world_from_camera=look_at(target_m + distance_m * towards, target_m),
+        sensor=config.sensor,
+        near_m=config.near_m,
+        far_m=config.far_m,
+    )
 
 
 def pixel_rays(

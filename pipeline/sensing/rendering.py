@@ -1,51 +1,81 @@
 """Pictures of a scene: SAPIEN's renderer, or Embree rays where no Vulkan driver is."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
 
+import numpy as np
+from jaxtyping import UInt8
 from loguru import logger
 
-from pipeline.clutter.scene import ClutterScene
+from pipeline.clutter.scene import ClutterScene, PlacedObject
+from pipeline.config.cameras import RendererName
 from pipeline.config.scenes import ScenesConfig
 from pipeline.errors import MachineError
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.sensing.cameras import PinholeCamera
-from pipeline.sensing.ray_rendering import ray_view
+from pipeline.sensing.ray_rendering import RayRenderer
 from pipeline.sensing.sapien_rendering import SapienRenderer
+from pipeline.sensing.view import CameraView
+
+# What of a transparent object's own colour is seen, the rest being what lies behind it.
+_TINT = 0.25
 
 
-class SceneRenderer(Protocol):
-    """Adds each camera's view to a scene."""
+class Renderer(Protocol):
+    """Draws objects on the table as each camera sees them, all of them opaque."""
 
     name: str
 
-    def rendered(self, scene: ClutterScene, objects: Mapping[str, CatalogueObject]) -> ClutterScene:
-        """The same scene with its views."""
+    def views(
+        self,
+        placed: Sequence[PlacedObject],
+        objects: Mapping[str, CatalogueObject],
+        cameras: Sequence[PinholeCamera],
+    ) -> tuple[CameraView, ...]:
+        """One exact view a camera."""
         ...
 
 
-class RayRenderer:
-    """Embree rays: pure pip, slower in colour, equal in depth."""
+def new_renderer(name: RendererName, config: ScenesConfig) -> Renderer:
+    """The renderer asked for; ``auto`` is SAPIEN's, and Embree's with a notice without a driver.
 
-    name = "embree"
-
-    def __init__(self, config: ScenesConfig, cameras: tuple[PinholeCamera, ...]) -> None:
-        self._config = config
-        self._cameras = cameras
-
-    def rendered(self, scene: ClutterScene, objects: Mapping[str, CatalogueObject]) -> ClutterScene:
-        """The same scene with its views."""
-        views = tuple(
-            ray_view(scene, objects, self._config.table_side_m, camera) for camera in self._cameras
-        )
-        return replace(scene, views=views)
-
-
-def new_renderer(config: ScenesConfig, cameras: tuple[PinholeCamera, ...]) -> SceneRenderer:
-    """SAPIEN's renderer where a driver is, Embree's with a notice where none is."""
+    Raises
+    ------
+    MachineError : SAPIEN's was asked for by name and no Vulkan driver can render.
+    """
+    if name == "embree":
+        return RayRenderer(config)
     try:
-        return SapienRenderer(config, cameras)
+        return SapienRenderer(config)
     except MachineError as error:
+        if name == "sapien":
+            raise
         logger.warning("rendering with Embree rays instead of SAPIEN: {}", error)
-        return RayRenderer(config, cameras)
+        return RayRenderer(config)
+
+
+def rendered(
+    scene: ClutterScene,
+    objects: Mapping[str, CatalogueObject],
+    cameras: Sequence[PinholeCamera],
+    renderer: Renderer,
+) -> ClutterScene:
+    """The same scene with its views, one a camera; through transparent objects one sees."""
+    views = renderer.views(scene.objects, objects, cameras)
+    opaque = [p for p in scene.objects if objects[p.object_name].material == "opaque"]
+    if len(opaque) < len(scene.objects):
+        behind = renderer.views(opaque, objects, cameras)
+        views = tuple(_seen_through(*pair) for pair in zip(views, behind, strict=True))
+    return replace(scene, views=views)
+
+
+def _seen_through(view: CameraView, behind: CameraView) -> CameraView:
+    """A view whose transparent objects let the view behind them through."""
+    return replace(view, colour=_blended(view, behind), behind_m=behind.depth_m)
+
+
+def _blended(view: CameraView, behind: CameraView) -> UInt8[np.ndarray, "h w 3"]:
+    mixed = _TINT * view.colour.astype(np.float64) + (1.0 - _TINT) * behind.colour
+    through = view.depth_m != behind.depth_m
+    return np.where(through[..., None], np.round(mixed), view.colour).astype(np.uint8)

@@ -11,9 +11,9 @@ from pipeline.config import RunConfig
 from pipeline.control.policy import Cause, Observation, attempt
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.gripper.pad import build_pad
-from pipeline.sensing.cameras import PinholeCamera, points_of_depth
+from pipeline.sensing.cameras import PinholeCamera, points_of_depth, static_cameras
 from pipeline.sensing.depth_noise import disturb
-from pipeline.sensing.rendering import SceneRenderer
+from pipeline.sensing.rendering import Renderer, rendered
 from pipeline.sensing.sub_cloud import sub_clouds
 from pipeline.simulation.engine import Body, add_body, new_world
 from pipeline.simulation.gripper_body import FloatingGripper
@@ -56,7 +56,7 @@ class SceneSensor:
         scene: ClutterScene,
         bodies: dict[int, Body],
         objects: Mapping[str, CatalogueObject],
-        renderer: SceneRenderer,
+        renderer: Renderer,
         config: RunConfig,
         rng: np.random.Generator,
     ) -> None:
@@ -75,11 +75,11 @@ class SceneSensor:
             PlacedObject(self._names[i], i, body.world_from_object)
             for i, body in sorted(self._bodies.items())
         )
-        view = self._renderer.rendered(replace(self._scene, objects=present), self._objects).views[
-            0
-        ]
-        self.camera = view.camera
-        depth = disturb(view, self._config.sensing, self._rng)
+        scene = replace(self._scene, objects=present)
+        camera = static_cameras(self._config.cameras.static)[0]
+        view = rendered(scene, self._objects, (camera,), self._renderer).views[0]
+        self.camera = camera
+        depth = disturb(view, self._rng) if self._config.sensing.disturbed else view.depth_m
         points, _, _ = points_of_depth(depth, view.camera, _CLOUD_EVERY)
         return Observation(points, view.camera.world_from_camera[:3, 3], depth)
 
@@ -87,7 +87,7 @@ class SceneSensor:
 def run_clutter(
     scene: ClutterScene,
     objects: Mapping[str, CatalogueObject],
-    renderer: SceneRenderer,
+    renderer: Renderer,
     predict: Predict,
     config: RunConfig,
     rng: np.random.Generator,

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -126,6 +127,8 @@ def test_two_at_once_and_an_interrupt(folder: Path, stop: signal.Signals) -> Non
         env={**os.environ, "MOOD": "slow"},
         stderr=subprocess.PIPE,
         text=True,
+        # A shell starts what it puts in the background deaf to SIGINT.
+        preexec_fn=partial(signal.signal, signal.SIGINT, signal.SIG_DFL),
     )
     deadline = time.monotonic() + 20
     while not (folder / ".state" / "slow").exists():

@@ -11,21 +11,34 @@ import trimesh
 from scipy import ndimage
 
 from pipeline.clutter.scene import ClutterScene, PlacedObject
-from pipeline.config import CameraConfig, ObjectsConfig, ScenesConfig, SensingConfig
-from pipeline.config.grasps import Noise
+from pipeline.config import (
+    CamerasConfig,
+    DepthSensor,
+    ObjectsConfig,
+    ScenesConfig,
+    SensingConfig,
+    StaticCameraConfig,
+    WristCameraConfig,
+)
 from pipeline.errors import MachineError
 from pipeline.geometry.catalogue import CatalogueObject, MeasuredObject, finish_object
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.mesh_files import MeshSource
 from pipeline.geometry.shape import nsvr, shape_class
-from pipeline.sensing.cameras import cameras_of, points_of_depth
-from pipeline.sensing.depth_noise import NOISE_MODELS, disturb, incidence_rad
-from pipeline.sensing.rendering import RayRenderer
+from pipeline.sensing.cameras import (
+    points_of_depth,
+    scene_cameras,
+    static_cameras,
+    wrist_cameras,
+)
+from pipeline.sensing.depth_noise import NOISE_MODELS, cosine_of_incidence, disturb
+from pipeline.sensing.ray_rendering import RayRenderer
+from pipeline.sensing.rendering import Renderer, new_renderer, rendered
 from pipeline.sensing.sapien_rendering import SapienRenderer
 from pipeline.sensing.sub_cloud import sub_clouds
-from pipeline.sensing.view import CameraView
+from pipeline.sensing.view import CameraView, normals_of
 
-CAMERAS = cameras_of(CameraConfig())
+CAMERAS = static_cameras(StaticCameraConfig())
 
 
 def made_object(name: str, shape: trimesh.Trimesh, cache: object) -> CatalogueObject:
@@ -33,18 +46,21 @@ def made_object(name: str, shape: trimesh.Trimesh, cache: object) -> CatalogueOb
     source = MeshSource(name, name, "none", mesh, "m", "declared")
     value = nsvr(mesh)
     measured = MeasuredObject(source, mesh, (), value, shape_class(value))
-    config = ObjectsConfig(target_extent_min_m=0.1, target_extent_max_m=0.1)
+    config = ObjectsConfig(
+        target_extent_min_m=0.1, target_extent_max_m=0.1, transparent=("glass*",)
+    )
     return finish_object(measured, config, np.random.default_rng(0), cache)  # type: ignore[arg-type]
 
 
 @pytest.fixture(scope="module")
 def objects(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, CatalogueObject]:
-    """A cube and a ball, 100 mm each."""
+    """A cube, a ball and a glass ball, 100 mm each."""
     cache = tmp_path_factory.mktemp("parts")
     ball = trimesh.creation.icosphere(subdivisions=5)
     return {
         "cube": made_object("cube", trimesh.creation.box(), cache),
         "ball": made_object("ball", ball, cache),
+        "glass ball": made_object("glass ball", ball, cache),
     }
 
 
@@ -58,13 +74,29 @@ def at(x: float, y: float, z: float) -> np.ndarray:
     return pose
 
 
+CUBE_AND_BALL = scene_of(
+    PlacedObject("cube", 1, at(-0.1, 0, 0.05)), PlacedObject("ball", 2, at(0.1, 0, 0.05))
+)
+
+
 @pytest.fixture(scope="module")
 def view(objects: Mapping[str, CatalogueObject]) -> CameraView:
     """Cube and ball seen by rays."""
-    scene = scene_of(
-        PlacedObject("cube", 1, at(-0.1, 0, 0.05)), PlacedObject("ball", 2, at(0.1, 0, 0.05))
-    )
-    return RayRenderer(ScenesConfig(), CAMERAS).rendered(scene, objects).views[0]
+    renderer = RayRenderer(ScenesConfig())
+    return rendered(CUBE_AND_BALL, objects, CAMERAS, renderer).views[0]
+
+
+@pytest.fixture(scope="module")
+def sapien_renderer() -> Renderer:
+    try:
+        return SapienRenderer(ScenesConfig())
+    except MachineError as error:
+        pytest.skip(f"no Vulkan driver: {error}")
+
+
+def through(view: CameraView, sensor: DepthSensor) -> CameraView:
+    """The same picture, taken through another sensor."""
+    return replace(view, camera=replace(view.camera, sensor=sensor))
 
 
 def test_depth_puts_every_pixel_on_its_surface(view: CameraView) -> None:
@@ -78,26 +110,111 @@ def test_depth_puts_every_pixel_on_its_surface(view: CameraView) -> None:
     np.testing.assert_allclose(radius, 0.05, atol=1e-4)
 
 
-def test_sapien_and_rays_agree(view: CameraView, objects: Mapping[str, CatalogueObject]) -> None:
-    try:
-        renderer = SapienRenderer(ScenesConfig(), CAMERAS)
-    except MachineError as error:
-        pytest.skip(f"no Vulkan driver: {error}")
-    scene = scene_of(
-        PlacedObject("cube", 1, at(-0.1, 0, 0.05)), PlacedObject("ball", 2, at(0.1, 0, 0.05))
+def interior(view: CameraView) -> np.ndarray:
+    """Pixels whose eight neighbours lie on the same body, with no step in depth."""
+    high = ndimage.maximum_filter(view.depth_m, 3) - ndimage.minimum_filter(view.depth_m, 3)
+    one = ndimage.maximum_filter(view.segmentation, 3) == ndimage.minimum_filter(
+        view.segmentation, 3
     )
-    one, two = (renderer.rendered(scene, objects).views[0] for _ in range(2))
-    assert one.depth_m.tobytes() == two.depth_m.tobytes()
-    # Lit: no pixel of the ball or the table is black.
-    assert one.colour.max(axis=2)[one.depth_m > 0].min() > 20
-    same = one.segmentation == view.segmentation
-    assert same.mean() > 0.999
-    assert (np.abs(one.depth_m - view.depth_m)[same] < 1e-4).mean() > 0.999
+    return np.asarray(one & (high < 0.02) & (view.depth_m > 0))
+
+
+def test_sapien_and_rays_agree(
+    sapien_renderer: Renderer, objects: Mapping[str, CatalogueObject]
+) -> None:
+    """On depth, segmentation and normals, from the static camera and from both wrist's."""
+    cameras = scene_cameras(
+        CamerasConfig(), np.array([[-0.1, 0, 0.05], [0.1, 0, 0.05]]), np.random.default_rng(2)
+    )
+    assert [camera.name for camera in cameras] == ["static_0", "wrist_0", "wrist_1"]
+    by_rays = rendered(CUBE_AND_BALL, objects, cameras, RayRenderer(ScenesConfig())).views
+    by_sapien = rendered(CUBE_AND_BALL, objects, cameras, sapien_renderer).views
+    again = rendered(CUBE_AND_BALL, objects, cameras, sapien_renderer).views
+    for one, two, rays in zip(by_sapien, again, by_rays, strict=True):
+        assert one.depth_m.tobytes() == two.depth_m.tobytes()
+        assert one.colour.tobytes() == two.colour.tobytes()
+        # Lit: no pixel of the ball or the table is black.
+        assert one.colour.max(axis=2)[one.depth_m > 0].min() > 20
+        inner = interior(rays)
+        assert inner.sum() > 0.98 * (rays.depth_m > 0).sum()
+        assert (one.segmentation == rays.segmentation)[inner].mean() > 0.999
+        assert (np.abs(one.depth_m - rays.depth_m)[inner] < 1e-4).mean() > 0.999
+        cosine = (normals_of(one) * normals_of(rays)).sum(axis=2)[inner]
+        assert (cosine > np.cos(np.radians(2.0))).mean() > 0.999
+
+
+def test_normals_are_those_of_the_surface(view: CameraView) -> None:
+    points, rows, columns = points_of_depth(view.depth_m, view.camera, 1)
+    in_world = normals_of(view)[rows, columns] @ view.camera.world_from_camera[:3, :3].T
+    body = view.segmentation[rows, columns]
+    np.testing.assert_allclose(
+        in_world[body == 0], [[0.0, 0.0, 1.0]] * (body == 0).sum(), atol=0.01
+    )
+    outward = (points[body == 2] - [0.1, 0, 0.05]) / 0.05
+    assert ((in_world[body == 2] * outward).sum(axis=1) > np.cos(np.radians(1.5))).mean() > 0.99
+
+
+def test_the_renderer_asked_for_is_the_one(sapien_renderer: Renderer) -> None:
+    assert new_renderer("embree", ScenesConfig()).name == "embree"
+    assert new_renderer("auto", ScenesConfig()).name == sapien_renderer.name == "sapien"
+
+
+def test_the_wrist_looks_at_an_object_from_its_distance() -> None:
+    config = WristCameraConfig(viewpoints=5)
+    centres = np.array([[0.1, 0.2, 0.03], [-0.2, 0.0, 0.05]])
+    cameras = wrist_cameras(config, centres, np.random.default_rng(4))
+    again = wrist_cameras(config, centres, np.random.default_rng(4))
+    looked_at = []
+    for camera, same in zip(cameras, again, strict=True):
+        np.testing.assert_array_equal(camera.world_from_camera, same.world_from_camera)
+        at_m = camera.world_from_camera @ [0.0, 0.0, config.distance_m, 1.0]
+        looked_at.append(int(np.argmin(np.linalg.norm(centres - at_m[:3], axis=1))))
+        np.testing.assert_allclose(at_m[:3], centres[looked_at[-1]], atol=1e-9)
+        height = camera.world_from_camera[2, 3] - at_m[2]
+        elevation = np.arcsin(height / config.distance_m)
+        assert config.elevation_min_rad <= elevation <= config.elevation_max_rad
+    assert sorted(looked_at) in ([0, 0, 0, 1, 1], [0, 0, 1, 1, 1])
+    assert wrist_cameras(config, np.empty((0, 3)), np.random.default_rng(4)) == ()
+
+
+def test_what_is_transparent_is_measured_through(objects: Mapping[str, CatalogueObject]) -> None:
+    """Its pixels measure the table behind it or nothing; exact depth still has it."""
+    glass = scene_of(
+        PlacedObject("cube", 1, at(-0.1, 0, 0.05)), PlacedObject("glass ball", 2, at(0.1, 0, 0.05))
+    )
+    renderer = RayRenderer(ScenesConfig())
+    seen = rendered(glass, objects, CAMERAS, renderer).views[0]
+    opaque = rendered(CUBE_AND_BALL, objects, CAMERAS, renderer).views[0]
+    assert opaque.behind_m is None
+    np.testing.assert_array_equal(seen.depth_m, opaque.depth_m)
+    on_glass = seen.segmentation == 2
+    for sensor in NOISE_MODELS:
+        measured = disturb(through(seen, sensor), np.random.default_rng(1))
+        returned = on_glass & (measured > 0)
+        model = NOISE_MODELS[sensor]
+        assert 0.5 * (1 - model.transparent_loss) < returned.sum() / on_glass.sum()
+        assert returned.sum() / on_glass.sum() < 1 - 0.9 * model.transparent_loss
+        points, rows, columns = points_of_depth(measured, seen.camera, 1)
+        behind = points[on_glass[rows, columns]]
+        assert abs(np.median(behind[:, 2])) < 0.002
+    # In colour it is mostly what lies behind it.
+    glassy = seen.colour[on_glass].astype(float)
+    table = seen.colour[(seen.segmentation == 0) & (seen.depth_m > 0)].astype(float).mean(axis=0)
+    solid = opaque.colour[on_glass].astype(float)
+    assert np.abs(glassy - table).mean() < 0.5 * np.abs(solid - table).mean()
+
+
+def test_nothing_is_measured_out_of_range(view: CameraView) -> None:
+    near = replace(view, camera=replace(view.camera, sensor="ideal", near_m=0.85))
+    measured = disturb(near, np.random.default_rng(0))
+    exact = view.depth_m.astype(np.float64)
+    np.testing.assert_array_equal(measured, np.where(exact >= 0.85, exact, 0.0))
+    assert ((measured == 0) & (exact > 0)).any()
 
 
 def test_noise_has_its_spread_and_its_seed(view: CameraView) -> None:
-    noisy = disturb(view, SensingConfig(), np.random.default_rng(3))
-    again = disturb(view, SensingConfig(), np.random.default_rng(3))
+    noisy = disturb(view, np.random.default_rng(3))
+    again = disturb(view, np.random.default_rng(3))
     assert noisy.tobytes() == again.tobytes()
     table = (view.segmentation == 0) & (noisy > 0)
     error = (noisy - view.depth_m)[table]
@@ -106,15 +223,15 @@ def test_noise_has_its_spread_and_its_seed(view: CameraView) -> None:
     assert abs(error.mean()) < 1e-4
 
 
-@pytest.mark.parametrize("noise", sorted(NOISE_MODELS))
-def test_every_sensor_has_its_published_spread(noise: Noise, view: CameraView) -> None:
+@pytest.mark.parametrize("sensor", sorted(NOISE_MODELS))
+def test_every_sensor_has_its_published_spread(sensor: DepthSensor, view: CameraView) -> None:
     """In units of the model's own spread at each pixel, the error is standard normal."""
-    model = NOISE_MODELS[noise]
-    noisy = disturb(view, SensingConfig(noise=noise), np.random.default_rng(5))
+    model = NOISE_MODELS[sensor]
+    noisy = disturb(through(view, sensor), np.random.default_rng(5))
     depth = view.depth_m.astype(np.float64)
     flat = (view.segmentation == 0) & (noisy > 0)
     sigma = model.floor_m + model.linear * depth + model.quadratic_1_m * (depth - 0.4) ** 2
-    units = ((noisy - depth) * np.cos(incidence_rad(view)) / sigma)[flat]
+    units = ((noisy - depth) * cosine_of_incidence(view) / sigma)[flat]
     assert units.std() == pytest.approx(1.0, abs=0.02)
     assert units.mean() == pytest.approx(0.0, abs=0.02)
 
@@ -126,10 +243,10 @@ def test_published_spreads_at_their_distances() -> None:
     assert light.floor_m + light.quadratic_1_m * (1.4 - 0.4) ** 2 == pytest.approx(0.0031)
 
 
-@pytest.mark.parametrize("noise", sorted(NOISE_MODELS))
-def test_no_sensor_sees_at_grazing_incidence(noise: Noise, view: CameraView) -> None:
-    noisy = disturb(view, SensingConfig(noise=noise), np.random.default_rng(5))
-    grazing = incidence_rad(view) > NOISE_MODELS[noise].grazing_rad
+@pytest.mark.parametrize("sensor", sorted(NOISE_MODELS))
+def test_no_sensor_sees_at_grazing_incidence(sensor: DepthSensor, view: CameraView) -> None:
+    noisy = disturb(through(view, sensor), np.random.default_rng(5))
+    grazing = cosine_of_incidence(view) < np.cos(NOISE_MODELS[sensor].grazing_rad)
     assert grazing.any()
     assert not noisy[grazing].any()
     assert (noisy[~grazing & (view.depth_m > 0)] > 0).mean() > 0.95
@@ -139,16 +256,16 @@ def test_incidence_on_the_table_is_the_angle_to_its_normal(view: CameraView) -> 
     points, rows, columns = points_of_depth(view.depth_m, view.camera, 1)
     ray = points - view.camera.world_from_camera[:3, 3]
     expected = np.arccos(-ray[:, 2] / np.linalg.norm(ray, axis=1))
-    found = incidence_rad(view)[rows, columns]
+    found = np.arccos(cosine_of_incidence(view))[rows, columns]
     table = ndimage.binary_erosion(view.segmentation == 0, iterations=3)[rows, columns]
     inner = table & (rows > 2) & (rows < 420) & (columns > 2) & (columns < 508)
     # The picture's own edge of the table is a step too.
     smooth = inner & (np.abs(points[:, :2]).max(axis=1) < 0.55)
-    np.testing.assert_allclose(found[smooth], expected[smooth], atol=2e-3)
+    np.testing.assert_allclose(found[smooth], expected[smooth], atol=6e-3)  # half a step of the map
 
 
-def test_no_noise_is_the_picture_itself(view: CameraView) -> None:
-    clean = disturb(view, SensingConfig(noise="none"), np.random.default_rng(0))
+def test_an_ideal_sensor_measures_the_picture_itself(view: CameraView) -> None:
+    clean = disturb(through(view, "ideal"), np.random.default_rng(0))
     np.testing.assert_array_equal(clean, view.depth_m)
 
 
@@ -189,12 +306,12 @@ def test_pictures_are_lit_where_convex_parts_are_computed_too() -> None:
     """CoACD and SAPIEN share a process; the order in which they load must not turn it dark."""
     script = (
         "import coacd\n"
-        "from pipeline.config import CameraConfig, ScenesConfig\n"
+        "from pipeline.config import ScenesConfig, StaticCameraConfig\n"
         "from pipeline.errors import MachineError\n"
-        "from pipeline.sensing.cameras import cameras_of\n"
+        "from pipeline.sensing.cameras import static_cameras\n"
         "from pipeline.sensing.sapien_rendering import rendered_table\n"
         "try:\n"
-        "    rendered_table(ScenesConfig(), cameras_of(CameraConfig())[0])\n"
+        "    rendered_table(ScenesConfig(), static_cameras(StaticCameraConfig())[0])\n"
         "except MachineError as error:\n"
         "    print(error)\n"
     )

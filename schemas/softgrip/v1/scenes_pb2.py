@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from schemas.softgrip.v1 import tensor_pb2 as schemas_dot_softgrip_dot_v1_dot_tensor__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n schemas/softgrip/v1/scenes.proto\x12\x0bsoftgrip.v1\x1a schemas/softgrip/v1/tensor.proto\"s\n\x0cPlacedObject\x12\x13\n\x0bobject_name\x18\x01 \x01(\t\x12\x0f\n\x07\x62ody_id\x18\x02 \x01(\r\x12.\n\x11world_from_object\x18\x03 \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12\r\n\x05gap_m\x18\x04 \x01(\x01\"\x97\x01\n\tViewpoint\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x10\n\x08width_px\x18\x02 \x01(\r\x12\x11\n\theight_px\x18\x03 \x01(\r\x12\'\n\nintrinsics\x18\x04 \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12.\n\x11world_from_camera\x18\x05 \x01(\x0b\x32\x13.softgrip.v1.Tensor\"\xaa\x02\n\x05Scene\x12\x10\n\x08scene_id\x18\x01 \x01(\t\x12\r\n\x05level\x18\x02 \x01(\r\x12\x13\n\x0bshape_class\x18\x03 \x01(\t\x12\x14\n\x0c\x64istribution\x18\x04 \x01(\t\x12\r\n\x05split\x18\x05 \x01(\t\x12\x0c\n\x04seed\x18\x06 \x01(\x04\x12*\n\x07objects\x18\x07 \x03(\x0b\x32\x19.softgrip.v1.PlacedObject\x12%\n\x08\x63ontacts\x18\x08 \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12\x15\n\rsettle_time_s\x18\t \x01(\x01\x12\x10\n\x08renderer\x18\n \x01(\t\x12*\n\nviewpoints\x18\x0b \x03(\x0b\x32\x16.softgrip.v1.Viewpoint\x12\x10\n\x08\x61ttempts\x18\x0c \x01(\rb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n schemas/softgrip/v1/scenes.proto\x12\x0bsoftgrip.v1\x1a schemas/softgrip/v1/tensor.proto\"s\n\x0cPlacedObject\x12\x13\n\x0bobject_name\x18\x01 \x01(\t\x12\x0f\n\x07\x62ody_id\x18\x02 \x01(\r\x12.\n\x11world_from_object\x18\x03 \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12\r\n\x05gap_m\x18\x04 \x01(\x01\"\xc6\x01\n\tViewpoint\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\x10\n\x08width_px\x18\x02 \x01(\r\x12\x11\n\theight_px\x18\x03 \x01(\r\x12\'\n\nintrinsics\x18\x04 \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12.\n\x11world_from_camera\x18\x05 \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12\x0e\n\x06sensor\x18\x06 \x01(\t\x12\x0e\n\x06near_m\x18\x07 \x01(\x01\x12\r\n\x05\x66\x61r_m\x18\x08 \x01(\x01\"\xaa\x02\n\x05Scene\x12\x10\n\x08scene_id\x18\x01 \x01(\t\x12\r\n\x05level\x18\x02 \x01(\r\x12\x13\n\x0bshape_class\x18\x03 \x01(\t\x12\x14\n\x0c\x64istribution\x18\x04 \x01(\t\x12\r\n\x05split\x18\x05 \x01(\t\x12\x0c\n\x04seed\x18\x06 \x01(\x04\x12*\n\x07objects\x18\x07 \x03(\x0b\x32\x19.softgrip.v1.PlacedObject\x12%\n\x08\x63ontacts\x18\x08 \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12\x15\n\rsettle_time_s\x18\t \x01(\x01\x12\x10\n\x08renderer\x18\n \x01(\t\x12*\n\nviewpoints\x18\x0b \x03(\x0b\x32\x16.softgrip.v1.Viewpoint\x12\x10\n\x08\x61ttempts\x18\x0c \x01(\rb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -35,7 +35,7 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_PLACEDOBJECT']._serialized_start=83
   _globals['_PLACEDOBJECT']._serialized_end=198
   _globals['_VIEWPOINT']._serialized_start=201
-  _globals['_VIEWPOINT']._serialized_end=352
-  _globals['_SCENE']._serialized_start=355
-  _globals['_SCENE']._serialized_end=653
+  _globals['_VIEWPOINT']._serialized_end=399
+  _globals['_SCENE']._serialized_start=402
+  _globals['_SCENE']._serialized_end=700
 # @@protoc_insertion_point(module_scope)

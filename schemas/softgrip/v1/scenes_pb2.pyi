@@ -20,18 +20,24 @@ class PlacedObject(_message.Message):
     def __init__(self, object_name: _Optional[str] = ..., body_id: _Optional[int] = ..., world_from_object: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., gap_m: _Optional[float] = ...) -> None: ...
 
 class Viewpoint(_message.Message):
-    __slots__ = ("name", "width_px", "height_px", "intrinsics", "world_from_camera")
+    __slots__ = ("name", "width_px", "height_px", "intrinsics", "world_from_camera", "sensor", "near_m", "far_m")
     NAME_FIELD_NUMBER: _ClassVar[int]
     WIDTH_PX_FIELD_NUMBER: _ClassVar[int]
     HEIGHT_PX_FIELD_NUMBER: _ClassVar[int]
     INTRINSICS_FIELD_NUMBER: _ClassVar[int]
     WORLD_FROM_CAMERA_FIELD_NUMBER: _ClassVar[int]
+    SENSOR_FIELD_NUMBER: _ClassVar[int]
+    NEAR_M_FIELD_NUMBER: _ClassVar[int]
+    FAR_M_FIELD_NUMBER: _ClassVar[int]
     name: str
     width_px: int
     height_px: int
     intrinsics: _tensor_pb2.Tensor
     world_from_camera: _tensor_pb2.Tensor
-    def __init__(self, name: _Optional[str] = ..., width_px: _Optional[int] = ..., height_px: _Optional[int] = ..., intrinsics: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., world_from_camera: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ...) -> None: ...
+    sensor: str
+    near_m: float
+    far_m: float
+    def __init__(self, name: _Optional[str] = ..., width_px: _Optional[int] = ..., height_px: _Optional[int] = ..., intrinsics: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., world_from_camera: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., sensor: _Optional[str] = ..., near_m: _Optional[float] = ..., far_m: _Optional[float] = ...) -> None: ...
 
 class Scene(_message.Message):
     __slots__ = ("scene_id", "level", "shape_class", "distribution", "split", "seed", "objects", "contacts", "settle_time_s", "renderer", "viewpoints", "attempts")
