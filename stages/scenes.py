@@ -1,7 +1,10 @@
 """Stage 2, scenes: objects → clutter of the nine levels, settled and rendered in SAPIEN."""
 
 import shutil
+import time
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -48,15 +51,48 @@ class SceneJob:
     provenance: Provenance
 
 
+class RenderClock:
+    """How much of the time since the first frame was spent rendering."""
+
+    def __init__(self) -> None:
+        self._first_frame_at: float | None = None
+        self._rendering_s = 0.0
+
+    @contextmanager
+    def rendering(self) -> Iterator[None]:
+        """Around the rendering of one scene."""
+        started = time.perf_counter()
+        yield
+        ended = time.perf_counter()
+        if self._first_frame_at is None:
+            self._first_frame_at = ended  # shaders were compiled: not counted
+        else:
+            self._rendering_s += ended - started
+
+    def share(self) -> float | None:
+        """Rendering time over wall time since the first scene's frames; None before a second."""
+        if self._first_frame_at is None or self._rendering_s == 0.0:
+            return None
+        return round(self._rendering_s / (time.perf_counter() - self._first_frame_at), 3)
+
+
 def build(stage: StageContext) -> Summary:
-    """Build, settle and render clutter scenes of every level, from each split's objects."""
+    """Build, settle and render clutter scenes of every level, from each split's objects.
+
+    Workers build clutters; this process alone renders them, one after the other: a driver keeps
+    the GPU, or all cores, busy by itself.
+    """
     jobs = scene_jobs(stage)
-    done = run_in_order(make_scene, jobs, stage.workers, stage.executor)
-    parts = list(progress(done, len(jobs), "scenes: settle and render", "scene"))
+    todo = [job for job in jobs if not is_current(job.path, job.provenance.key)]
+    built = run_in_order(settled_clutter, todo, stage.workers, stage.executor)
+    clock = RenderClock()
+    for job, scene in zip(todo, progress(built, len(todo), "scenes", "scene"), strict=True):
+        render(job, scene, clock)
+    parts = [job.path for job in jobs]
     publish(stage, parts)
     scenes = [read_scene(stage.output, index) for index in range(len(parts))]
     shutil.rmtree(stage.folder.state("scenes"))
-    return summary(scenes)
+    return summary(scenes) | {"render_share": clock.share()}
 
 
 def scene_jobs(stage: StageContext) -> list[SceneJob]:
@@ -82,10 +118,8 @@ def scene_jobs(stage: StageContext) -> list[SceneJob]:
     return jobs
 
 
-def make_scene(job: SceneJob) -> Path:
-    """Make, or keep, one scene: its own file until all are there."""
-    if is_current(job.path, job.provenance.key):
-        return job.path
+def settled_clutter(job: SceneJob) -> ClutterScene:
+    """One clutter at rest, without views."""
     shape_class, _ = level_of(job.level)
     pool = [
         item
@@ -99,16 +133,20 @@ def make_scene(job: SceneJob) -> Path:
             "Add meshes, raise objects.limit, or leave the level out of scenes.levels",
         )
     seed = derive_seed(job.config.seed, "scene", job.scene_id)
-    scene = build_clutter(job.scene_id, job.level, job.split, pool, job.config.scenes, seed)
-    objects = {item.name: item for item in pool}
-    renderer = renderer_of(job.config)
+    return build_clutter(job.scene_id, job.level, job.split, pool, job.config.scenes, seed)
+
+
+def render(job: SceneJob, scene: ClutterScene, clock: RenderClock) -> None:
+    """One scene with its views, in a file of its own until all are there."""
+    objects = {name: item for name, (item, _) in catalogue(job.objects).items()}
     rng = generator(job.config.seed, "cameras", job.scene_id)
     centres = np.array([placed.world_from_object[:3, 3] for placed in scene.objects])
     cameras = scene_cameras(job.config.cameras, centres, rng)
-    seen = rendered(scene, objects, cameras, renderer)
+    renderer = renderer_of(job.config)
+    with clock.rendering():
+        seen = rendered(scene, objects, cameras, renderer)
     with ArtifactWriter(job.path, job.provenance) as artifact:
         write_scene(artifact, 0, seen, renderer.name)
-    return job.path
 
 
 @lru_cache(maxsize=1)
@@ -119,7 +157,7 @@ def catalogue(objects: Path) -> dict[str, tuple[CatalogueObject, str]]:
 
 @lru_cache(maxsize=1)
 def renderer_of(config: RunConfig) -> Renderer:
-    """The renderer of this worker; its first frame costs seconds, so it is kept."""
+    """The renderer; its first frame costs seconds, so it is kept."""
     return new_renderer(config.cameras.renderer, config.scenes)
 
 

@@ -134,9 +134,13 @@ def _stacked(
     """SE(3): a pile; what lies apart from it is dropped onto it again."""
     world, bodies, settle_time_s = pile(items, config, rng)
     surfaces = [Surface(item.mesh) for item in items]
+    poses: list[Float[np.ndarray, "4 4"]] = []
+    gaps = None
     for _ in range(_DROPS_AGAIN):
-        poses = [body.world_from_object for body in bodies]
-        gaps = pairwise_gaps_m(surfaces, poses, beyond_m=2 * config.touch_gap_max_m)
+        before, poses = poses, [body.world_from_object for body in bodies]
+        gaps = pairwise_gaps_m(
+            surfaces, poses, 2 * config.touch_gap_max_m, known=gaps, known_poses=before
+        )
         off = [body.body_id - 1 for body in fallen_off(bodies, config)]
         apart = off or np.flatnonzero(gaps.min(axis=1) > config.touch_gap_max_m).tolist()
         if not apart or len(items) == 1:

@@ -88,7 +88,10 @@ def drop_again(
     config: ScenesConfig,
     rng: np.random.Generator,
 ) -> float:
-    """Take one body and let it fall onto the middle of the others; simulated time taken [s]."""
+    """Take one body and let it fall onto the middle of the others; simulated time taken [s].
+
+    A body that touches no other supports none: the others sleep on until they are hit.
+    """
     others = [i for i in range(len(bodies)) if i != index]
     middle = np.median([bodies[i].world_from_object[:2, 3] for i in others], axis=0)
     pose = np.eye(4)
@@ -99,8 +102,7 @@ def drop_again(
     body = bodies[index]
     body.entity.pose = sapien_pose(pose)
     body.rigid.linear_velocity = body.rigid.angular_velocity = np.zeros(3)
-    for other in bodies:
-        other.rigid.wake_up()
+    body.rigid.wake_up()
     return settle(world, bodies, config)
 
 

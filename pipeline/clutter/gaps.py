@@ -13,6 +13,9 @@ from pipeline.geometry.raycasting import RayScene
 
 NO_NEIGHBOUR_M = np.inf
 
+Box = tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]
+"""Lower and upper corner of an axis-aligned box."""
+
 
 class Surface:
     """A mesh prepared for distance queries at any pose."""
@@ -62,17 +65,25 @@ def pairwise_gaps_m(
     surfaces: Sequence[Surface],
     poses: Sequence[Float[np.ndarray, "4 4"]],
     beyond_m: float = NO_NEIGHBOUR_M,
+    known: Float[np.ndarray, "n n"] | None = None,
+    known_poses: Sequence[Float[np.ndarray, "4 4"]] = (),
 ) -> Float[np.ndarray, "n n"]:
     """Gap of every pair [m], inf on the diagonal.
 
     beyond_m : pairs whose bounding boxes are farther apart than this are not measured and get
         the boxes' distance, which is a lower bound of the gap.
+    known, known_poses : gaps by the same ``beyond_m`` at other poses; a pair of which neither
+        has moved since keeps its own.
     """
     count = len(surfaces)
     gaps = np.full((count, count), NO_NEIGHBOUR_M)
+    still = [np.array_equal(a, b) for a, b in zip(known_poses, poses, strict=False)]
     boxes = [bounds_of(s.mesh, pose) for s, pose in zip(surfaces, poses, strict=True)]
     for i in range(count):
         for j in range(i + 1, count):
+            if known is not None and still[i] and still[j]:
+                gaps[i, j] = gaps[j, i] = known[i, j]
+                continue
             apart = box_distance_m(boxes[i], boxes[j])
             if apart <= beyond_m:
                 apart = gap_m(surfaces[i], poses[i], surfaces[j], poses[j])
@@ -99,18 +110,13 @@ def nearest_gaps_m(
     return nearest
 
 
-def bounds_of(
-    mesh: Mesh, world_from_object: Float[np.ndarray, "4 4"]
-) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]]:
-    """Lower and upper corner of the axis-aligned box in the world."""
+def bounds_of(mesh: Mesh, world_from_object: Float[np.ndarray, "4 4"]) -> Box:
+    """The mesh's box in the world."""
     vertices = mesh.transformed(world_from_object).vertices_m
     return vertices.min(axis=0), vertices.max(axis=0)
 
 
-def box_distance_m(
-    first: tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]],
-    second: tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"]],
-) -> float:
+def box_distance_m(first: Box, second: Box) -> float:
     """Distance of two axis-aligned boxes, 0 where they overlap [m]."""
     apart = np.maximum(first[0] - second[1], second[0] - first[1])
     return float(np.linalg.norm(np.maximum(apart, 0.0)))
@@ -128,12 +134,29 @@ def _deepest_vertex_m(points_of: Mesh, inside_of: Mesh) -> float:
     if len(near) == 0:
         return 0.0
     # From inside a closed surface, the first hit of any ray is seen from behind.
-    up = np.array([0.0, 0.0, 1.0])
-    rays = RayScene([inside_of])
-    hits = rays.cast(near, up)
+    low, high = near.min(axis=0), near.max(axis=0)
+    above = _faces_in(inside_of, low, np.array([high[0], high[1], np.inf]))
+    if len(above.faces) == 0:
+        return 0.0
+    rays = RayScene([above])
+    hits = rays.cast(near, np.array([0.0, 0.0, 1.0]))
     inside = np.nan_to_num(rays.normals_at(hits)[:, 2]) > 0
     if not inside.any():
         return 0.0
-    surface = trimesh.Trimesh(inside_of.vertices_m, inside_of.faces, process=False)
+    # The surface is no farther than the ray went: what lies beyond need not be searched.
+    reach = float(hits.distance_m[inside].max())
+    around = _faces_in(
+        inside_of, near[inside].min(axis=0) - reach, near[inside].max(axis=0) + reach
+    )
+    surface = trimesh.Trimesh(around.vertices_m, around.faces, process=False)
     _, distance, _ = trimesh.proximity.closest_point(surface, near[inside])
     return float(distance.max())
+
+
+def _faces_in(
+    mesh: Mesh, lower_m: Float[np.ndarray, " 3"], upper_m: Float[np.ndarray, " 3"]
+) -> Mesh:
+    """The mesh's faces whose boxes reach into a box."""
+    corners = mesh.vertices_m[mesh.faces]
+    reaching = (corners.min(axis=1) <= upper_m) & (corners.max(axis=1) >= lower_m)
+    return Mesh(mesh.vertices_m, mesh.faces[reaching.all(axis=1)])

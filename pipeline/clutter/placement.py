@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from pipeline.clutter.gaps import Surface, bounds_of, box_distance_m, gap_m
+from pipeline.clutter.gaps import Box, Surface, bounds_of, box_distance_m, gap_m
 from pipeline.config.scenes import ScenesConfig
 from pipeline.errors import SceneError
 
@@ -36,7 +36,7 @@ def place_isolated(
     SceneError : no room was found for an object.
     """
     placed: list[Float[np.ndarray, "4 4"]] = [np.eye(4)] * len(surfaces)
-    done: list[int] = []
+    boxes: dict[int, Box] = {}
     # The largest first: the smallest find room between them.
     order = np.argsort([-np.ptp(s.mesh.vertices_m, axis=0).max() for s in surfaces], kind="stable")
     for index in (int(i) for i in order):
@@ -44,16 +44,18 @@ def place_isolated(
             pose = turned(resting[index], rng.uniform(0, 2 * np.pi))
             pose = moved(pose, *_inside(surfaces[index], pose, config, rng))
             needed = config.isolated_gap_min_m + _MARGIN_M
+            box = bounds_of(surfaces[index].mesh, pose)
             if all(
-                _gap_at_least(surfaces[index], pose, surfaces[other], placed[other], needed)
-                for other in done
+                box_distance_m(box, boxes[other]) >= needed
+                or gap_m(surfaces[index], pose, surfaces[other], placed[other]) >= needed
+                for other in boxes
             ):
                 placed[index] = pose
-                done.append(index)
+                boxes[index] = box
                 break
         else:
             raise SceneError(
-                f"No room for object {len(done) + 1} of {len(surfaces)} with gaps of "
+                f"No room for object {len(boxes) + 1} of {len(surfaces)} with gaps of "
                 f"{1e3 * config.isolated_gap_min_m:.0f} mm",
                 "Raise scenes.workspace_side_m, or lower scenes.objects_per_clutter",
             )
@@ -126,14 +128,18 @@ def _slide(
     way = target_m - pose[:2, 3]
     left = float(np.linalg.norm(way))
     way = way / left
+    boxes = [bounds_of(s.mesh, at) for s, at in zip(surfaces, placed, strict=False)]
+    start, box = pose[:3, 3].copy(), bounds_of(surfaces[index].mesh, pose)
     for _ in range(_STEPS_PER_SLIDE):
-        excess = (
-            min(
-                gap_m(surfaces[index], pose, surfaces[other], placed[other])
-                for other in range(len(placed))
-            )
-            - wanted_m
-        )
+        shift = pose[:3, 3] - start
+        apart = [box_distance_m((box[0] + shift, box[1] + shift), other) for other in boxes]
+        nearest = np.inf
+        for other in np.argsort(apart, kind="stable"):
+            if apart[other] >= nearest:
+                break  # the boxes' distance is a lower bound
+            gap = gap_m(surfaces[index], pose, surfaces[other], placed[other])
+            nearest = min(nearest, gap)
+        excess = nearest - wanted_m
         if abs(excess) <= _ARRIVED_M:
             return pose
         if excess < 0 or left <= 0:
@@ -174,16 +180,3 @@ def _outside(
     own = float(np.linalg.norm(surfaces[-1].mesh.extents_m))
     clear = np.sqrt(2) * reach + own
     return np.array([clear * np.cos(azimuth_rad), clear * np.sin(azimuth_rad)])
-
-
-def _gap_at_least(
-    first: Surface,
-    world_from_first: Float[np.ndarray, "4 4"],
-    second: Surface,
-    world_from_second: Float[np.ndarray, "4 4"],
-    needed_m: float,
-) -> bool:
-    boxes = bounds_of(first.mesh, world_from_first), bounds_of(second.mesh, world_from_second)
-    if box_distance_m(*boxes) >= needed_m:
-        return True
-    return gap_m(first, world_from_first, second, world_from_second) >= needed_m

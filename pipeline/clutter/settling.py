@@ -44,7 +44,10 @@ def fallen_off(bodies: Sequence[Body], config: ScenesConfig) -> list[Body]:
 
 def _at_rest(bodies: Sequence[Body], config: ScenesConfig) -> bool:
     return all(
-        body.linear_speed_m_s < config.settle_linear_m_s
-        and body.angular_speed_rad_s < config.settle_angular_rad_s
+        body.rigid.is_sleeping
+        or (
+            body.linear_speed_m_s < config.settle_linear_m_s
+            and body.angular_speed_rad_s < config.settle_angular_rad_s
+        )
         for body in bodies
     )

@@ -22,7 +22,7 @@ _CAMERA_FROM_SAPIEN = np.array(
 
 
 # The rasteriser's normals have y up and z towards the camera.
-_CCS_FROM_OPENGL = np.array([1.0, -1.0, -1.0])
+_CCS_FROM_OPENGL = np.array([1.0, -1.0, -1.0], dtype=np.float32)
 
 _Optics = tuple[int, int, tuple[float, ...]]
 
@@ -88,9 +88,9 @@ class SapienRenderer:
         return CameraView(
             camera=camera,
             depth_m=np.where(seen, np.maximum(-position[..., 2], 0.0), 0.0).astype(np.float32),
-            colour=np.clip(np.round(255 * colour), 0, 255).astype(np.uint8),
+            colour=(255 * np.clip(colour, 0, 1) + 0.5).astype(np.uint8),
             segmentation=np.where(seen, lookup[np.minimum(body, len(lookup) - 1)], 0),
-            normals=normal_map(np.where(seen[..., None], normals, 0.0)),
+            normals=normal_map(normals * seen[..., None]),
         )
 
 

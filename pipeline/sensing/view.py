@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 from jaxtyping import Float, UInt8, UInt16
 
@@ -30,10 +31,22 @@ class CameraView:
 
 def normal_map(normals: Float[np.ndarray, "h w 3"]) -> UInt8[np.ndarray, "h w 3"]:
     """Unit normals in CCS as 128 + 127 n; where a normal is zero or not finite, 0."""
-    valid = np.isfinite(normals).all(axis=2) & (np.abs(normals).max(axis=2) > 0.0)
-    # From 1 to 255, so that no direction reads as nothing seen.
-    scaled = 128 + np.round(127 * np.clip(np.nan_to_num(normals), -1.0, 1.0))
-    return np.where(valid[..., None], scaled, 0).astype(np.uint8)
+    return np.asarray(_normal_map(normals))
+
+
+@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+def _normal_map(normals: Float[np.ndarray, "h w 3"]) -> UInt8[np.ndarray, "h w 3"]:
+    encoded = np.zeros(normals.shape, dtype=np.uint8)
+    for i in range(normals.shape[0]):
+        for j in range(normals.shape[1]):
+            x, y, z = normals[i, j]
+            largest = max(abs(x), abs(y), abs(z))
+            if np.isfinite(x + y + z) and largest > 0.0:
+                # From 1 to 255, so that no direction reads as nothing seen.
+                for k in range(3):
+                    scaled = 127.0 * min(max(normals[i, j, k], -1.0), 1.0)
+                    encoded[i, j, k] = 128 + int(np.floor(scaled + 0.5))
+    return encoded
 
 
 def normals_of(view: CameraView) -> Float[np.ndarray, "h w 3"]:
