@@ -28,7 +28,7 @@ ifeq (,$(strip $(WORKERS)))
 unexport WORKERS
 endif
 
-.PHONY: help dataset objects scenes grasps shards train eval evaluate status doctor setup test bench lint clean FORCE
+.PHONY: help dataset objects scenes grasps shards train eval evaluate status doctor setup test bench gallery lint clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -83,6 +83,9 @@ test: .venv/.ready lint  ## lint, types, tests
 bench: .venv/.ready  ## speed of labelling, QP, storage and control, to runs/bench/bench.json
 	@$(MAKE) --no-print-directory scenes RUN=bench
 	@$(PY) -m stages.bench
+
+gallery: .venv/.ready  ## the nine levels on one sheet, to runs/<run>/gallery.png
+	@$(PY) -m stages.gallery
 
 lint: .venv/.ready
 	$(PY) -m ruff check .

@@ -165,7 +165,9 @@ def publish(stage: StageContext, parts: list[Path]) -> None:
     """One recording and one artifact of all scenes, in order."""
     meshes = {n: item.mesh for n, (item, _) in catalogue(stage.upstream("objects")).items()}
     nsvr = {n: item.nsvr for n, (item, _) in catalogue(stage.upstream("objects")).items()}
-    with recording(stage.recording, stage.stage.name, stage.key.digest, blueprint()) as stream:
+    cameras = [view.camera.name for view in read_scene(parts[0], 0).views]
+    opening = blueprint(cameras)
+    with recording(stage.recording, stage.stage.name, stage.key.digest, opening) as stream:
         for step, index in enumerate(spread(len(parts), stage.config.recording.scenes)):
             show_scene(stream, step, read_scene(parts[index], 0), meshes, nsvr)
     name = renderer_of(stage.config).name

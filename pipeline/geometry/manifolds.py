@@ -13,8 +13,8 @@ def to_manifold(mesh: Mesh) -> manifold3d.Manifold:
     """
     solid = manifold3d.Manifold(
         manifold3d.Mesh64(
-            vert_properties=np.ascontiguousarray(mesh.vertices_m, dtype=np.float64),
-            tri_verts=np.ascontiguousarray(mesh.faces, dtype=np.uint64),
+            vert_properties=np.array(mesh.vertices_m, dtype=np.float64, order="C"),
+            tri_verts=np.array(mesh.faces, dtype=np.uint64, order="C"),
         )
     )
     if solid.status() != manifold3d.Error.NoError:

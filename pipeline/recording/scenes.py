@@ -1,6 +1,6 @@
 """scenes.rrd: each clutter in 3-D with its cameras, pictures, cloud and table of facts."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import rerun as rr
@@ -20,38 +20,46 @@ FRUSTUM_M = 0.15
 CLOUD_EVERY = 3  # every third pixel a side: a ninth of the points
 
 
-def blueprint() -> rrb.Blueprint:
-    """Opens on the scene in 3-D, with the first camera's pictures and the facts beside it."""
-    first = "/world/camera_0"
+SHOWN_CAMERAS = 3  # more rows are too small to see; their pictures are in the recording
+PICTURES = ("colour", "depth", "segmentation", "normals")
+
+
+def blueprint(cameras: Sequence[str]) -> rrb.Blueprint:
+    """Opens on the scene in 3-D; beside it the pictures, a row a camera, and the facts."""
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Spatial3DView(
                 origin="/world",
                 contents=[
                     "$origin/**",
-                    "- $origin/camera_0/depth",
-                    "- $origin/camera_0/segmentation",
+                    *(f"- $origin/{name}/{kind}" for name in cameras for kind in PICTURES[1:]),
                 ],
                 name="Scene, cameras and coloured cloud",
                 eye_controls=looking((-0.75, -0.75, 0.7), (0.05, 0.05, 0.05)),
             ),
             rrb.Vertical(
-                rrb.Spatial2DView(
-                    origin=f"{first}/colour", contents=f"{first}/colour", name="Colour"
-                ),
-                rrb.Spatial2DView(origin=f"{first}/depth", contents=f"{first}/depth", name="Depth"),
-                rrb.Spatial2DView(
-                    origin=f"{first}/segmentation",
-                    contents=f"{first}/segmentation",
-                    name="Segmentation",
+                rrb.Grid(
+                    *(
+                        _picture(name, kind)
+                        for name in cameras[:SHOWN_CAMERAS]
+                        for kind in PICTURES
+                    ),
+                    grid_columns=len(PICTURES),
                 ),
                 rrb.TextDocumentView(origin="/notes/scene", name="Level, gaps, NSVR"),
+                row_shares=[3, 2],
             ),
-            column_shares=[3, 2],
+            column_shares=[1, 1],
         ),
         time_panel(TIMELINE),
         collapse_panels=True,
     )
+
+
+def _picture(camera: str, kind: str) -> rrb.Spatial2DView:
+    """One picture that a camera took, exact."""
+    path = f"/world/{camera}/{kind}"
+    return rrb.Spatial2DView(origin=path, contents=path, name=f"{camera} {kind}")
 
 
 def show_scene(
@@ -69,8 +77,8 @@ def show_scene(
         mesh = meshes[placed.object_name]
         stream.log(path, shown_mesh(mesh, colours.by_index(placed.body_id)))
         stream.log(path, shown_pose(placed.world_from_object))
-    for index, view in enumerate(scene.views):
-        _show_view(stream, f"world/camera_{index}", view)
+    for view in scene.views:
+        _show_view(stream, f"world/{view.camera.name}", view)
     stream.log(
         "notes/scene", rr.TextDocument(_facts(scene, nsvr), media_type=rr.MediaType.MARKDOWN)
     )
@@ -91,6 +99,7 @@ def _show_view(stream: rr.RecordingStream, path: str, view: CameraView) -> None:
     stream.log(f"{path}/colour", rr.Image(view.colour).compress(jpeg_quality=90))
     stream.log(f"{path}/depth", rr.DepthImage(view.depth_m.astype(np.float16), meter=1.0))
     stream.log(f"{path}/segmentation", rr.SegmentationImage(view.segmentation))
+    stream.log(f"{path}/normals", rr.Image(view.normals).compress(jpeg_quality=90))
     points, rows, columns = points_of_depth(view.depth_m, camera, CLOUD_EVERY)
     stream.log(
         f"world/cloud/{camera.name}",

@@ -1,0 +1,80 @@
+"""`make gallery`: the first clutter of each level, rendered large, on one sheet."""
+
+import io
+import os
+import sys
+from dataclasses import replace
+
+import numpy as np
+from loguru import logger
+
+from pipeline.artifacts import publish_bytes
+from pipeline.artifacts.object_messages import read_objects
+from pipeline.artifacts.scene_messages import read_scenes
+from pipeline.clutter.gaps import bounds_of
+from pipeline.clutter.scene import ClutterScene
+from pipeline.config import StaticCameraConfig, load_run_config
+from pipeline.errors import ArtifactError, SoftgripError
+from pipeline.execution import RunFolder
+from pipeline.geometry.catalogue import CatalogueObject
+from pipeline.recording.gallery import contact_sheet
+from pipeline.sensing.cameras import PinholeCamera, camera_at
+from pipeline.sensing.rendering import new_renderer, rendered
+from stages.graph import RUNS_DIR
+
+PORTRAIT = StaticCameraConfig(width_px=560, height_px=420, vertical_fov_rad=0.6, sensor="ideal")
+ELEVATION_RAD, AZIMUTH_RAD = 0.75, -0.9
+MARGIN = 0.92  # of the sphere around the objects, which they never fill
+
+
+def make_gallery(folder: RunFolder) -> None:
+    """Render the sheet of a run and write it beside the run's scenes.
+
+    Raises
+    ------
+    ArtifactError : the run has no scenes yet.
+    """
+    scenes_path = folder.artifact("scenes")
+    if not scenes_path.is_file():
+        name = folder.path.name
+        raise ArtifactError(f"{scenes_path} is missing", f"Make it first: make scenes RUN={name}")
+    config = load_run_config(folder.config)
+    objects = {name: item for name, (item, _) in read_objects(folder.artifact("objects")).items()}
+    first: dict[int, ClutterScene] = {}
+    for scene in read_scenes(scenes_path):
+        first.setdefault(scene.level, scene)
+    renderer = new_renderer(config.cameras.renderer, config.scenes)
+    pictures = {
+        level: rendered(scene, objects, (portrait_camera(scene, objects),), renderer)
+        .views[0]
+        .colour
+        for level, scene in first.items()
+    }
+    png = io.BytesIO()
+    contact_sheet(pictures).save(png, format="PNG", optimize=True)
+    path = folder.path / "gallery.png"
+    publish_bytes(path, png.getvalue())
+    logger.info("gallery: levels {} in {}", ", ".join(str(level) for level in sorted(first)), path)
+
+
+def portrait_camera(scene: ClutterScene, objects: dict[str, CatalogueObject]) -> PinholeCamera:
+    """A camera from the side and above that has all of a scene in its picture."""
+    boxes = [bounds_of(objects[p.object_name].mesh, p.world_from_object) for p in scene.objects]
+    lower = np.min([box[0] for box in boxes], axis=0)
+    upper = np.max([box[1] for box in boxes], axis=0)
+    radius_m = float(np.linalg.norm(upper - lower)) / 2
+    distance_m = MARGIN * radius_m / np.sin(PORTRAIT.vertical_fov_rad / 2)
+    camera = camera_at(
+        "portrait", PORTRAIT, (lower + upper) / 2, float(distance_m), ELEVATION_RAD, AZIMUTH_RAD
+    )
+    return replace(camera, near_m=0.05)
+
+
+if __name__ == "__main__":
+    logger.remove()
+    logger.add(sys.stderr, level="INFO", format="{message}")
+    try:
+        make_gallery(RunFolder(RUNS_DIR / os.environ.get("RUN", "default")))
+    except SoftgripError as error:
+        logger.error("gallery: {}", error)
+        sys.exit(1)
