@@ -264,6 +264,23 @@ def test_incidence_on_the_table_is_the_angle_to_its_normal(view: CameraView) -> 
     np.testing.assert_allclose(found[smooth], expected[smooth], atol=6e-3)  # half a step of the map
 
 
+def test_incidence_matches_the_plain_formula(view: CameraView) -> None:
+    """The oracle decodes the normals and divides by the rays' lengths."""
+    rows, columns = np.indices(view.depth_m.shape)
+    k = view.camera.intrinsics
+    ray = np.stack(
+        [
+            (columns + 0.5 - k[0, 2]) / k[0, 0],
+            (rows + 0.5 - k[1, 2]) / k[1, 1],
+            np.ones(view.depth_m.shape),
+        ],
+        axis=2,
+    )
+    cosine = -(normals_of(view) * ray).sum(axis=2) / np.linalg.norm(ray, axis=2)
+    expected = np.clip(np.nan_to_num(cosine), 0.0, 1.0)
+    np.testing.assert_allclose(cosine_of_incidence(view), expected, atol=1e-12)
+
+
 def test_an_ideal_sensor_measures_the_picture_itself(view: CameraView) -> None:
     clean = disturb(through(view, "ideal"), np.random.default_rng(0))
     np.testing.assert_array_equal(clean, view.depth_m)
