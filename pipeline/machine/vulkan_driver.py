@@ -121,7 +121,7 @@ def advice() -> str:
     source = backports_source()
     if source is not None:
         target = APT_SOURCES / "softgrip-backports.sources"
-        lines.append(f"printf '%s' {source!r} | sudo tee {target}")
+        lines.append(f"printf '%b' {source!r} | sudo tee {target}")
     lines += [" ".join(["sudo", *command]) for command in install_commands()]
     return "\n".join(f"    {line}" for line in lines)
 

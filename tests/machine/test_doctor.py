@@ -65,3 +65,14 @@ def test_it_runs_before_anything_is_installed() -> None:
         check=False,
     )
     assert bare.returncode == 0, bare.stderr
+
+
+def test_the_printed_command_writes_the_source_that_installing_writes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    source = "Types: deb\nURIs: http://deb.debian.org/debian\nSuites: bookworm-backports\n"
+    monkeypatch.setattr(vulkan_driver, "backports_source", lambda: source)
+    first = vulkan_driver.advice().splitlines()[0].strip()
+    written, _, _ = first.partition(" | ")
+    said = subprocess.run(["/bin/sh", "-c", written], capture_output=True, text=True, check=True)
+    assert said.stdout == source
