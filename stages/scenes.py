@@ -1,16 +1,16 @@
 """Stage 2, scenes: objects → clutter of the nine levels, settled and rendered in SAPIEN."""
 
 import shutil
-import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from loguru import logger
+import rerun as rr
 
 from pipeline.artifacts import ArtifactWriter, Provenance
 from pipeline.artifacts.object_messages import read_objects
@@ -30,12 +30,16 @@ from pipeline.execution import (
     run_in_order,
     stage_command,
 )
+from pipeline.execution.busy import BusyClock
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.recording.recording import recording, spread
 from pipeline.recording.scenes import blueprint, show_scene
-from pipeline.sensing.cameras import scene_cameras
+from pipeline.sensing.cameras import camera_names, scene_cameras
 from pipeline.sensing.rendering import Renderer, new_renderer, rendered
 from stages.graph import SCENES, inputs_of
+
+WAITING_TO_BE_WRITTEN = 4  # rendered scenes, some MB each
+AHEAD = 16  # clutters a worker may be ahead of rendering: a stack takes longer than others
 
 
 @dataclass(frozen=True)
@@ -51,46 +55,33 @@ class SceneJob:
     provenance: Provenance
 
 
-class RenderClock:
-    """How much of the time since the first frame was spent rendering."""
-
-    def __init__(self) -> None:
-        self._first_frame_at: float | None = None
-        self._rendering_s = 0.0
-
-    @contextmanager
-    def rendering(self) -> Iterator[None]:
-        """Around the rendering of one scene."""
-        started = time.perf_counter()
-        yield
-        ended = time.perf_counter()
-        if self._first_frame_at is None:
-            self._first_frame_at = ended  # shaders were compiled: not counted
-        else:
-            self._rendering_s += ended - started
-
-    def share(self) -> float | None:
-        """Rendering time over wall time since the first scene's frames; None before a second."""
-        if self._first_frame_at is None or self._rendering_s == 0.0:
-            return None
-        return round(self._rendering_s / (time.perf_counter() - self._first_frame_at), 3)
-
-
 def build(stage: StageContext) -> Summary:
     """Build, settle and render clutter scenes of every level, from each split's objects.
 
-    Workers build clutters; this process alone renders them, one after the other: a driver keeps
-    the GPU, or all cores, busy by itself.
+    Workers build clutters ahead; this process renders them one after the other, as a driver
+    keeps the GPU or all cores busy by itself; a thread writes what is rendered.
     """
     jobs = scene_jobs(stage)
-    todo = [job for job in jobs if not is_current(job.path, job.provenance.key)]
-    built = run_in_order(settled_clutter, todo, stage.workers, stage.executor)
-    clock = RenderClock()
-    for job, scene in zip(todo, progress(built, len(todo), "scenes", "scene"), strict=True):
-        render(job, scene, clock)
-    parts = [job.path for job in jobs]
-    publish(stage, parts)
-    scenes = [read_scene(stage.output, index) for index in range(len(parts))]
+    missing = [job for job in jobs if not is_current(job.path, job.provenance.key)]
+    settled = run_in_order(settled_clutter, missing, stage.workers, stage.executor, AHEAD)
+    built = iter(progress(settled, len(missing), "scenes", "scene"))
+    clock = BusyClock()
+    scenes: list[ClutterScene] = []
+    with ExitStack() as files, ThreadPoolExecutor(1) as writer:
+        publication = files.enter_context(Publication.opened(stage, len(jobs)))
+        writes: deque[Future[None]] = deque()
+        for job in jobs:
+            if job in missing:
+                seen = render(job, next(built), clock)
+                save(job, seen, renderer_of(job.config).name)
+            else:
+                seen = read_scene(job.path, 0)
+            writes.append(writer.submit(publication.add, seen))
+            if len(writes) > WAITING_TO_BE_WRITTEN:
+                writes.popleft().result()
+            scenes.append(replace(seen, views=()))
+        for write in writes:
+            write.result()
     shutil.rmtree(stage.folder.state("scenes"))
     return summary(scenes) | {"render_share": clock.share()}
 
@@ -136,17 +127,21 @@ def settled_clutter(job: SceneJob) -> ClutterScene:
     return build_clutter(job.scene_id, job.level, job.split, pool, job.config.scenes, seed)
 
 
-def render(job: SceneJob, scene: ClutterScene, clock: RenderClock) -> None:
-    """One scene with its views, in a file of its own until all are there."""
+def render(job: SceneJob, scene: ClutterScene, clock: BusyClock) -> ClutterScene:
+    """The scene with its views."""
     objects = {name: item for name, (item, _) in catalogue(job.objects).items()}
     rng = generator(job.config.seed, "cameras", job.scene_id)
     centres = np.array([placed.world_from_object[:3, 3] for placed in scene.objects])
     cameras = scene_cameras(job.config.cameras, centres, rng)
     renderer = renderer_of(job.config)
-    with clock.rendering():
-        seen = rendered(scene, objects, cameras, renderer)
+    with clock.busy():
+        return rendered(scene, objects, cameras, renderer)
+
+
+def save(job: SceneJob, scene: ClutterScene, renderer: str) -> None:
+    """A rendered scene in a file of its own, kept until all are there."""
     with ArtifactWriter(job.path, job.provenance) as artifact:
-        write_scene(artifact, 0, seen, renderer.name)
+        write_scene(artifact, 0, scene, renderer)
 
 
 @lru_cache(maxsize=1)
@@ -161,20 +156,39 @@ def renderer_of(config: RunConfig) -> Renderer:
     return new_renderer(config.cameras.renderer, config.scenes)
 
 
-def publish(stage: StageContext, parts: list[Path]) -> None:
-    """One recording and one artifact of all scenes, in order."""
-    meshes = {n: item.mesh for n, (item, _) in catalogue(stage.upstream("objects")).items()}
-    nsvr = {n: item.nsvr for n, (item, _) in catalogue(stage.upstream("objects")).items()}
-    cameras = [view.camera.name for view in read_scene(parts[0], 0).views]
-    opening = blueprint(cameras)
-    with recording(stage.recording, stage.stage.name, stage.key.digest, opening) as stream:
-        for step, index in enumerate(spread(len(parts), stage.config.recording.scenes)):
-            show_scene(stream, step, read_scene(parts[index], 0), meshes, nsvr)
-    name = renderer_of(stage.config).name
-    logger.debug("scenes: rendered with {}", name)
-    with ArtifactWriter(stage.output, stage.provenance()) as artifact:
-        for index, part in enumerate(parts):
-            write_scene(artifact, index, read_scene(part, 0), name)
+class Publication:
+    """The stage's recording and artifact, to which scenes are added in order."""
+
+    def __init__(
+        self, stage: StageContext, scenes: int, artifact: ArtifactWriter, stream: rr.RecordingStream
+    ) -> None:
+        self._artifact = artifact
+        self._stream = stream
+        items = catalogue(stage.upstream("objects"))
+        self._meshes = {name: item.mesh for name, (item, _) in items.items()}
+        self._nsvr = {name: item.nsvr for name, (item, _) in items.items()}
+        shown = spread(scenes, stage.config.recording.scenes)
+        self._step_of = {index: step for step, index in enumerate(shown)}
+        self._renderer = renderer_of(stage.config).name
+        self._added = 0
+
+    @classmethod
+    @contextmanager
+    def opened(cls, stage: StageContext, scenes: int) -> Iterator["Publication"]:
+        """Both files; when the block ends well the recording appears first, the artifact last."""
+        opening = blueprint(camera_names(stage.config.cameras))
+        with (
+            ArtifactWriter(stage.output, stage.provenance()) as artifact,
+            recording(stage.recording, stage.stage.name, stage.key.digest, opening) as stream,
+        ):
+            yield cls(stage, scenes, artifact, stream)
+
+    def add(self, scene: ClutterScene) -> None:
+        """The next scene."""
+        index, self._added = self._added, self._added + 1
+        if index in self._step_of:
+            show_scene(self._stream, self._step_of[index], scene, self._meshes, self._nsvr)
+        write_scene(self._artifact, index, scene, self._renderer)
 
 
 def summary(scenes: list[ClutterScene]) -> Summary:

@@ -28,11 +28,15 @@ def run_in_order(
     items: Iterable[Item],
     workers: int,
     executor: Executor = "local",
+    ahead_per_worker: int = AHEAD_PER_WORKER,
 ) -> Iterator[Result]:
     """Yield ``job(item)`` for every item, in order, from ``workers`` processes or a Ray cluster.
 
     One worker runs in this process. Processes are spawned, not forked: drivers
     of graphics and threads of native libraries do not survive a fork.
+
+    ahead_per_worker : results that may wait for their turn; many where they are small and
+        items take unequal time.
 
     Raises
     ------
@@ -53,7 +57,7 @@ def run_in_order(
     try:
         for item in items:
             waiting.append(pool.submit(job, item))
-            if len(waiting) >= workers * AHEAD_PER_WORKER:
+            if len(waiting) >= workers * ahead_per_worker:
                 yield waiting.popleft().result()
         while waiting:
             yield waiting.popleft().result()

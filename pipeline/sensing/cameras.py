@@ -46,6 +46,12 @@ def scene_cameras(
     return (*static_cameras(config.static), *wrist_cameras(config.wrist, objects_m, rng))
 
 
+def camera_names(config: CamerasConfig) -> list[str]:
+    """Names of a scene's viewpoints, in their order."""
+    static = [f"static_{number}" for number in range(len(config.static.elevations_rad))]
+    return static + [f"wrist_{number}" for number in range(config.wrist.viewpoints)]
+
+
 def static_cameras(config: StaticCameraConfig) -> tuple[PinholeCamera, ...]:
     """One camera a viewpoint, each looking at the middle of the table."""
     places = zip(config.elevations_rad, config.azimuths_rad, strict=True)

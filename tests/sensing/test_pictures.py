@@ -26,6 +26,7 @@ from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.mesh_files import MeshSource
 from pipeline.geometry.shape import nsvr, shape_class
 from pipeline.sensing.cameras import (
+    camera_names,
     points_of_depth,
     scene_cameras,
     static_cameras,
@@ -127,6 +128,7 @@ def test_sapien_and_rays_agree(
         CamerasConfig(), np.array([[-0.1, 0, 0.05], [0.1, 0, 0.05]]), np.random.default_rng(2)
     )
     assert [camera.name for camera in cameras] == ["static_0", "wrist_0", "wrist_1"]
+    assert camera_names(CamerasConfig()) == [camera.name for camera in cameras]
     by_rays = rendered(CUBE_AND_BALL, objects, cameras, RayRenderer(ScenesConfig())).views
     by_sapien = rendered(CUBE_AND_BALL, objects, cameras, sapien_renderer).views
     again = rendered(CUBE_AND_BALL, objects, cameras, sapien_renderer).views
