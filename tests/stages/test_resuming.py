@@ -1,0 +1,71 @@
+"""A run killed without warning, stage by stage, goes on and ends with the same bytes."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from pipeline.execution import RunFolder
+from stages.graph import STAGES
+from tests.stages.conftest import ROOT, TINY, run_stage
+from tests.stages.test_pipeline import digests
+
+# What must be there before the kill: the first finished piece where a stage makes pieces.
+FIRST_PIECE = {
+    "scenes": ".state/scenes/*.mcap",
+    "grasps": "grasps/*.mcap",
+    "evaluate": ".state/evaluate/*.mcap",
+}
+MOMENTS_S = {"objects": 2.5, "shards": 1.5, "train": 4.0}
+
+
+def kill_when(stage: str, folder: RunFolder, moment: Callable[[float], bool]) -> int:
+    """Start a stage, kill it and its workers at a moment; its exit code."""
+    environment = {k: v for k, v in os.environ.items() if k not in ("MESH_DIR", "RUN", "WORKERS")}
+    started = time.monotonic()
+    process = subprocess.Popen(
+        [
+            *(sys.executable, "-m", f"stages.{stage}", "--run", folder.path.name),
+            *("--runs-dir", str(folder.path.parent), "--workers", "2"),
+        ],
+        cwd=ROOT,
+        env=environment,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    while process.poll() is None and not moment(time.monotonic() - started):
+        time.sleep(0.01)
+    if process.poll() is None:
+        os.killpg(process.pid, signal.SIGKILL)
+    return process.wait()
+
+
+def test_killed_in_every_stage_it_ends_with_the_same_bytes(run: RunFolder, tmp_path: Path) -> None:
+    folder = RunFolder(tmp_path / "tiny")
+    folder.path.mkdir()
+    folder.config.write_text(TINY)
+    killed = 0
+    for stage in STAGES:
+        piece = FIRST_PIECE.get(stage)
+
+        def moment(
+            elapsed_s: float, piece: str | None = piece, after_s: float = MOMENTS_S.get(stage, 0.0)
+        ) -> bool:
+            return any(folder.path.glob(piece)) if piece else elapsed_s > after_s
+
+        killed += kill_when(stage, folder, moment) == -signal.SIGKILL
+        done = run_stage(stage, tmp_path, workers=2)
+        assert done.returncode == 0, done.stderr[-3000:]
+    assert killed >= 3
+    assert digests(folder) == digests(run)
+    assert not list(folder.path.rglob(".*.part"))
+
+
+@pytest.mark.parametrize("stage", ["scenes", "evaluate"])
+def test_pieces_of_a_finished_stage_are_gone(run: RunFolder, stage: str) -> None:
+    assert not run.state(stage).exists()
