@@ -20,13 +20,15 @@ from pipeline.artifacts.grasp_messages import grasp_batch
 from pipeline.artifacts.object_messages import read_objects
 from pipeline.artifacts.sample_messages import Samples
 from pipeline.artifacts.scene_messages import read_scenes
-from pipeline.benchmarks import control, labelling, solvers, storage
+from pipeline.benchmarks import clutter, control, labelling, solvers, storage
 from pipeline.benchmarks.clock import Laps
 from pipeline.clutter.scene import ClutterScene
 from pipeline.config import RunConfig, load_run_config
 from pipeline.config.grasps import SolverName
 from pipeline.execution import RunFolder, generator, run_in_order
+from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.mesh import Mesh
+from pipeline.geometry.shape import ShapeClass
 from pipeline.gripper.heights import pad_heights
 from pipeline.network.export import OnnxPredictor, export_onnx_bytes
 from pipeline.network.ga_cnn import GaCnn
@@ -50,6 +52,7 @@ CONTROL_STEPS = 60
 CONTROL_THREADS = 2
 PROBLEMS: dict[SolverName, int] = {"structured": 2000, "piqp-sparse": 200, "piqp-dense": 12}
 WORKER_SECONDS = 6.0
+PILES = 5
 
 
 @dataclass(frozen=True)
@@ -69,13 +72,22 @@ class Bench:
     config: RunConfig
     scenes: list[ClutterScene]
     meshes: dict[str, Mesh]
+    objects: dict[str, CatalogueObject]
 
 
 def main() -> int:
     """Measure, print the table, write bench.json."""
     bench = opened(RunFolder(RUNS_DIR / "bench"))
     figures: dict[str, object] = {"cores": len(os.sched_getaffinity(0))}
-    for measure in (end_to_end, phases, quadratic_programs, scaling, storing, control_steps):
+    for measure in (
+        end_to_end,
+        phases,
+        quadratic_programs,
+        scaling,
+        storing,
+        control_steps,
+        settling,
+    ):
         found = measure(bench)
         figures |= found
         sys.stdout.write(json.dumps(found, indent=1) + "\n")
@@ -96,6 +108,7 @@ def opened(folder: RunFolder) -> Bench:
         load_run_config(folder.config),
         list(read_scenes(folder.artifact("scenes"))),
         {name: item.mesh for name, (item, _) in objects.items()},
+        {name: item for name, (item, _) in objects.items()},
     )
 
 
@@ -272,6 +285,19 @@ def control_steps(bench: Bench) -> dict[str, object]:
         "control_step_ms": {name: round(value, 2) for name, value in found.items()},
         "control_layers": bench.config.network.layers,
     }
+
+
+def settling(bench: Bench) -> dict[str, object]:
+    """Times real time at which a pile of each class settles."""
+    pools = {
+        kind: [item for item in bench.objects.values() if item.shape_class == kind]
+        for kind in ShapeClass
+    }
+    speeds = {
+        str(kind): round(clutter.settling_speed(pool, bench.config.scenes, PILES, seed=0), 1)
+        for kind, pool in pools.items()
+    }
+    return {"settling_times_real_time": speeds}
 
 
 if __name__ == "__main__":

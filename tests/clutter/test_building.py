@@ -7,10 +7,13 @@ import pytest
 import trimesh
 
 from pipeline.clutter.building import build_clutter
+from pipeline.clutter.levels import Distribution, level_of
 from pipeline.clutter.scene import ClutterScene
-from pipeline.config import ScenesConfig
+from pipeline.config import ConvexPartsConfig, ObjectsConfig, ScenesConfig
 from pipeline.errors import SceneError
-from pipeline.geometry.catalogue import CatalogueObject
+from pipeline.geometry.catalogue import CatalogueObject, finish_object, measure_object
+from pipeline.geometry.parametric import PARAMETRIC_OBJECTS, parametric_source
+from pipeline.geometry.shape import ShapeClass
 from tests.bodies import catalogue_object
 
 CONFIG = ScenesConfig(objects_per_clutter=4)
@@ -82,3 +85,44 @@ def test_a_level_that_cannot_be_met_is_an_error_not_a_scene(pool: list[Catalogue
     )
     with pytest.raises(SceneError, match="no clutter of level 1 in 2 tries"):
         build_clutter("s", 1, "train", pool, crowded, seed=0)
+
+
+@pytest.fixture(scope="module")
+def embedded(tmp_path_factory: pytest.TempPathFactory) -> dict[ShapeClass, list[CatalogueObject]]:
+    """Four embedded objects of each class."""
+    cache = tmp_path_factory.mktemp("embedded")
+    convex = ConvexPartsConfig(input_faces=500)
+    config = ObjectsConfig(target_extent_max_m=0.12, convex=convex)
+    pools: dict[ShapeClass, list[CatalogueObject]] = {kind: [] for kind in ShapeClass}
+    for number, name in enumerate(sorted(PARAMETRIC_OBJECTS)):
+        measured = measure_object(parametric_source(name), config)
+        if len(pools[measured.shape_class]) < 4:
+            rng = np.random.default_rng(number)
+            pools[measured.shape_class].append(finish_object(measured, config, rng, cache))
+    return pools
+
+
+@pytest.mark.parametrize("level", range(1, 10))
+def test_every_level_of_table_2_from_embedded_objects(
+    level: int, embedded: dict[ShapeClass, list[CatalogueObject]]
+) -> None:
+    """Of the level's class, spread as it says, and the same bits again from the same seed."""
+    kind, distribution = level_of(level)
+    items = embedded[kind]
+    one, two = (build_clutter("s", level, "test", items, CONFIG, seed=11) for _ in range(2))
+    for first, second in zip(one.objects, two.objects, strict=True):
+        assert first.world_from_object.tobytes() == second.world_from_object.tobytes()
+    bodies = placed(one, items)
+    gaps = nearest_gaps_m(bodies)
+    np.testing.assert_allclose(one.gaps_m, gaps, atol=3e-3)
+    if distribution is Distribution.ISOLATED:
+        assert one.gaps_m.min() >= CONFIG.isolated_gap_min_m
+    elif distribution is Distribution.MULTIPLE:
+        assert 0 < one.gaps_m.min() <= one.gaps_m.max() <= CONFIG.multiple_gap_max_m
+    else:
+        assert one.gaps_m.max() <= CONFIG.touch_gap_max_m
+    corners = np.concatenate([body.bounds for body in bodies])
+    assert corners[:, 2].min() >= -CONFIG.sink_max_m
+    assert np.abs(corners[:, :2]).max() <= CONFIG.table_side_m / 2
+    if distribution is not Distribution.STACKED:
+        assert max(body.bounds[0, 2] for body in bodies) <= CONFIG.touch_gap_max_m

@@ -100,7 +100,17 @@ def through(view: CameraView, sensor: DepthSensor) -> CameraView:
     return replace(view, camera=replace(view.camera, sensor=sensor))
 
 
-def test_depth_puts_every_pixel_on_its_surface(view: CameraView) -> None:
+@pytest.mark.parametrize("renderer", ["embree", "sapien"])
+def test_depth_puts_every_pixel_on_its_surface(
+    renderer: str, view: CameraView, request: pytest.FixtureRequest
+) -> None:
+    """Plane, box and sphere as formulas; every pixel of Embree's, 99.9 % inside of SAPIEN's."""
+    if renderer == "sapien":
+        driver: Renderer = request.getfixturevalue("sapien_renderer")
+        objects = request.getfixturevalue("objects")
+        view = rendered(CUBE_AND_BALL, objects, CAMERAS, driver).views[0]
+        inner = interior(view)
+        view = replace(view, depth_m=np.where(inner, view.depth_m, 0.0))
     points, rows, columns = points_of_depth(view.depth_m, view.camera, 1)
     body = view.segmentation[rows, columns]
     assert (body == 0).any()
