@@ -68,7 +68,7 @@ class WristCameraConfig(DepthCameraConfig):
     viewpoints: int = Field(2, ge=0, le=32, description="places the wrist goes to in each scene")
     distance_m: float = Field(0.45, gt=0.05, description="from the object looked at [m]")
     elevation_min_rad: float = Field(
-        0.9, gt=0, le=math.pi / 2, description="flattest look at an object [rad]"
+        1.2, gt=0, le=math.pi / 2, description="flattest look at an object [rad]"
     )
     elevation_max_rad: float = Field(
         1.5, gt=0, le=math.pi / 2, description="steepest look at an object [rad]"

@@ -28,7 +28,7 @@ class NetworkConfig(Section):
 class TrainConfig(Section):
     """Optimisation of GA-CNN."""
 
-    epochs: int = Field(20, ge=1, le=10_000, description="passes over the training samples")
+    epochs: int = Field(30, ge=1, le=10_000, description="passes over the training samples")
     batch_size: int = Field(128, ge=2, le=65536, description="samples in one step")
     learning_rate: float = Field(2e-3, gt=0, le=1, description="highest rate of the schedule")
     weight_decay: float = Field(0.02, ge=0, le=1, description="of AdamW; not on norms and biases")
@@ -37,7 +37,7 @@ class TrainConfig(Section):
         0.02, gt=0, le=1, description="error in q up to which the loss is square, then absolute"
     )
     gradient_norm_max: float = Field(1.0, gt=0, le=1e6, description="longer gradients are cut")
-    patience_epochs: int = Field(8, ge=1, description="stop after so many epochs without gain")
+    patience_epochs: int = Field(15, ge=1, description="stop after so many epochs without gain")
     augment: bool = Field(True, description="turn and mirror clouds about the approach axis")
     threads: int = Field(2, ge=1, le=256, description="CPU threads; part of the run's identity")
     device: Literal["auto", "cpu", "cuda"] = Field(
