@@ -28,7 +28,7 @@ ifeq (,$(strip $(WORKERS)))
 unexport WORKERS
 endif
 
-.PHONY: help dataset objects scenes grasps shards train eval evaluate status doctor setup test bench gallery lint clean FORCE
+.PHONY: help dataset objects scenes grasps shards train eval evaluate status doctor setup test bench gallery review lint clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -86,6 +86,9 @@ bench: .venv/.ready  ## speed of labelling, QP, storage and control, to runs/ben
 
 gallery: .venv/.ready  ## the nine levels on one sheet, to runs/<run>/gallery.png
 	@$(PY) -m stages.gallery
+
+review: .venv/.ready  ## recordings of RUN (of STAGE alone) in the Rerun viewer
+	@STAGE=$(STAGE) $(PY) -m stages.review
 
 lint: .venv/.ready
 	$(PY) -m ruff check .
