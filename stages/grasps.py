@@ -327,11 +327,11 @@ def record(stage: StageContext, shards: list[Path], quality: np.ndarray) -> None
     chosen = spread(len(shards), RECORDED_SCENES)
     each = max(1, stage.config.recording.grasps // len(chosen))
     meshes = {n: item.mesh for n, (item, _) in catalogue(stage.upstream("objects")).items()}
-    shown: list[ShownGrasp] = []
-    for index in chosen:
-        scene = read_scene(stage.upstream("scenes"), index)
-        shown += shown_grasps(scene, shards[index], meshes, stage.config, each)
     with recording(stage.recording, stage.stage.name, stage.key.digest, blueprint()) as stream:
+        shown: list[ShownGrasp] = []
+        for index in chosen:
+            scene = read_scene(stage.upstream("scenes"), index)
+            shown += shown_grasps(scene, shards[index], meshes, stage.config, each)
         show_grasps(stream, shown, meshes, pad_of(stage.config), quality)
 
 

@@ -32,6 +32,7 @@ from pipeline.execution import (
 )
 from pipeline.execution.busy import BusyClock
 from pipeline.geometry.catalogue import CatalogueObject
+from pipeline.recording.cost import recording_cost
 from pipeline.recording.recording import recording, spread
 from pipeline.recording.scenes import blueprint, show_scene
 from pipeline.sensing.cameras import camera_names, scene_cameras
@@ -179,7 +180,9 @@ class Publication:
         opening = blueprint(camera_names(stage.config.cameras))
         with (
             ArtifactWriter(stage.output, stage.provenance()) as artifact,
-            recording(stage.recording, stage.stage.name, stage.key.digest, opening) as stream,
+            recording(
+                stage.recording, stage.stage.name, stage.key.digest, opening, amid_work=True
+            ) as stream,
         ):
             yield cls(stage, scenes, artifact, stream)
 
@@ -187,7 +190,8 @@ class Publication:
         """The next scene."""
         index, self._added = self._added, self._added + 1
         if index in self._step_of:
-            show_scene(self._stream, self._step_of[index], scene, self._meshes, self._nsvr)
+            with recording_cost.running():
+                show_scene(self._stream, self._step_of[index], scene, self._meshes, self._nsvr)
         write_scene(self._artifact, index, scene, self._renderer)
 
 

@@ -22,6 +22,7 @@ from pipeline.errors import ArtifactError, ConfigError, SoftgripError
 from pipeline.execution.executors import Executor
 from pipeline.execution.freshness import Key, key_from_json, stage_key
 from pipeline.execution.stage import RunFolder, Stage, StageContext
+from pipeline.recording.cost import LARGEST_MB, recording_cost
 from schemas.softgrip.v1.grasps_pb2 import ShardIndex
 
 Summary = dict[str, Any]
@@ -120,7 +121,18 @@ def run_stage(context: StageContext, build: Build, force: bool) -> None:
     logger.info("{}: started ({} workers)", name, context.workers)
     summary = build(context)
     wall_s = time.perf_counter() - started
-    record = {"stage": name, "key": context.key.digest, "wall_time_s": round(wall_s, 3), **summary}
+    recorded_mb = context.recording.stat().st_size / 1e6
+    if recorded_mb > LARGEST_MB:
+        advice = "{} has {:.0f} MB, which is slow to open: lower the numbers in [recording]"
+        logger.warning(advice, context.recording, recorded_mb)
+    record = {
+        "stage": name,
+        "key": context.key.digest,
+        "wall_time_s": round(wall_s, 3),
+        "recording_share": round(recording_cost.seconds / wall_s, 4),
+        "recording_mb": round(recorded_mb, 3),
+        **summary,
+    }
     publish_bytes(context.folder.summary(name), (json.dumps(record, indent=2) + "\n").encode())
     publish_bytes(context.folder.state(f"{name}.built.json"), context.key.to_json().encode())
     logger.info("{}: done in {:.1f} s, {}", name, wall_s, output)

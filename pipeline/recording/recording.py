@@ -1,13 +1,21 @@
 """One Rerun recording a stage: how it is opened, named, bounded and published.
 
-Entity paths and the timeline are named alike across stages: what is in the
-world lies under ``/world``, pictures under ``/camera``, curves under
-``/curves``, words under ``/notes``; the one timeline of a recording is named
-by what it steps through (``object``, ``scene``, ``grasp``, ``epoch``, ...).
+Entity paths and the timeline are named alike across stages, and a test holds every stage to it:
+
+- ``/world``: what has a place in space, in metres, z up. Things that come and go lie at
+  ``/world/<kind>/<step>/<thing>`` (see `numbered`), a camera and its pictures at
+  ``/world/<camera>/colour``, ``depth``, ``segmentation`` and ``normals``.
+- ``/curves/<quantity>/<curve>``: figures, as curves over the timeline or as bars.
+- ``/notes/<subject>``: words, as Markdown.
+- One timeline a recording, of whole numbers from 0, named by what it steps through:
+  `TIMELINES`. A view on another timeline would open empty.
+
+How many things a recording shows is bounded by ``[recording]`` of run.toml, so that it stays
+under `LARGEST_MB` of ``cost``; what it costs is ``recording_share`` of the stage's summary.
 """
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -16,26 +24,41 @@ import rerun.blueprint as rrb
 from jaxtyping import UInt8
 
 from pipeline.artifacts.publishing import published
+from pipeline.recording.cost import recording_cost
 
 APPLICATION = "softgrip"
+ROOTS = ("world", "curves", "notes")
+TIMELINES = {
+    "objects": "object",
+    "scenes": "scene",
+    "grasps": "grasp",
+    "shards": "sample",
+    "train": "epoch",
+    "evaluate": "frame",
+}
 
 
 @contextmanager
 def recording(
-    path: Path, stage: str, recording_id: str, blueprint: rrb.Blueprint
+    path: Path, stage: str, recording_id: str, blueprint: rrb.Blueprint, amid_work: bool = False
 ) -> Iterator[rr.RecordingStream]:
     """Open the recording of a stage; it appears at ``path`` when the block ends well.
 
     recording_id : the stage's key, so that equal runs open as the same recording.
+    amid_work : the block holds the stage's work too, and what it logs runs under
+        `recording_cost` itself; else the whole block counts as recording.
     """
     with published(path) as scratch:
-        stream = rr.RecordingStream(f"{APPLICATION}_{stage}", recording_id=recording_id)
-        stream.save(scratch, default_blueprint=blueprint)
+        with recording_cost.running():
+            stream = rr.RecordingStream(f"{APPLICATION}_{stage}", recording_id=recording_id)
+            stream.save(scratch, default_blueprint=blueprint)
         try:
-            yield stream
+            with nullcontext() if amid_work else recording_cost.running():
+                yield stream
         finally:
-            stream.flush()
-            stream.disconnect()
+            with recording_cost.running():
+                stream.flush()
+                stream.disconnect()
 
 
 def looking(

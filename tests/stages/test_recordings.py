@@ -1,6 +1,7 @@
 """Each stage's recording as a person sees it: opened in the real viewer, off screen."""
 
 import io
+import json
 from pathlib import Path
 
 import numpy as np
@@ -8,20 +9,15 @@ import pytest
 import rerun as rr
 import rerun.blueprint as rrb
 from PIL import Image
+from rerun.chunk import RrdReader
 
 from pipeline.errors import MachineError
 from pipeline.execution import RunFolder
+from pipeline.recording.cost import LARGEST_MB
+from pipeline.recording.recording import ROOTS, TIMELINES
 from pipeline.recording.viewer import Sight, sight_of
 from stages.graph import STAGES
 
-TIMELINES = {
-    "objects": "object",
-    "scenes": "scene",
-    "grasps": "grasp",
-    "shards": "sample",
-    "train": "epoch",
-    "evaluate": "frame",
-}
 # Least share of a view that is drawn, beyond what an empty one has of words and grid.
 DRAWN = 0.001
 
@@ -69,3 +65,23 @@ def test_the_viewer_shows_all_of_it(seen: tuple[str, Sight], empty_share: float)
         "evaluate": "Scene, pad and its path",
     }
     assert drawn_share(sight.view_png[spatial[stage]]) > empty_share + DRAWN
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_paths_and_timelines_are_named_alike(stage: str, run: RunFolder) -> None:
+    roots, timelines = set(), set()
+    for chunk in RrdReader(run.recording(stage)).stream():
+        if chunk.entity_path.startswith("/__"):
+            continue  # Rerun's own: properties of the recording
+        roots.add(chunk.entity_path.split("/")[1])
+        timelines |= set(chunk.timeline_names)
+    assert roots <= set(ROOTS)
+    assert timelines - {"log_time", "log_tick"} == {TIMELINES[stage]}
+
+
+@pytest.mark.parametrize("stage", STAGES)
+def test_the_summary_says_what_recording_cost(stage: str, run: RunFolder) -> None:
+    summary = json.loads(run.summary(stage).read_text())
+    assert 0 < summary["recording_share"] < 1
+    assert 0 < summary["recording_mb"] < LARGEST_MB
+    assert summary["recording_mb"] == pytest.approx(run.recording(stage).stat().st_size / 1e6, 1e-2)
