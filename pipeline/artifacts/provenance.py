@@ -1,5 +1,6 @@
 """Where an artifact comes from: the metadata record every file carries."""
 
+import hashlib
 import json
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, version
@@ -9,6 +10,7 @@ from pipeline.errors import ArtifactError
 
 METADATA_NAME = "provenance"
 SCHEMA_VERSION = "softgrip.v1"
+DIGEST = "record_sha256"  # MCAP has no checksum of a metadata record
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,8 @@ class Provenance:
         """The record as MCAP metadata (strings only)."""
         fields = asdict(self)
         fields["inputs"] = json.dumps(fields["inputs"], sort_keys=True)
-        return {name: str(value) for name, value in fields.items()}
+        record = {name: str(value) for name, value in fields.items()}
+        return {**record, DIGEST: _digest(record)}
 
     @classmethod
     def from_metadata(cls, metadata: dict[str, str]) -> Self:
@@ -47,13 +50,18 @@ class Provenance:
 
         Raises
         ------
-        ArtifactError : fields are missing, or another major schema version wrote it.
+        ArtifactError : fields are missing or damaged, or another major schema version wrote it.
         """
         written = metadata.get("schema_version", "none")
         if written != SCHEMA_VERSION:
             raise ArtifactError(
                 f"Written with schema version {written}, this softgrip reads {SCHEMA_VERSION}",
                 "Use the softgrip version that wrote it, or make the file again",
+            )
+        if metadata.get(DIGEST) != _digest(metadata):
+            raise ArtifactError(
+                "The provenance record is damaged: it does not match its own SHA-256",
+                "Delete the file and run the same command again",
             )
         try:
             inputs = tuple(Input(**entry) for entry in json.loads(metadata["inputs"]))
@@ -71,6 +79,12 @@ class Provenance:
                 f"The provenance record cannot be read ({error!r})",
                 "The file is damaged: make it again",
             ) from error
+
+
+def _digest(record: dict[str, str]) -> str:
+    """SHA-256 over all other fields of a record."""
+    fields = {name: value for name, value in record.items() if name != DIGEST}
+    return hashlib.sha256(json.dumps(fields, sort_keys=True).encode()).hexdigest()
 
 
 def package_version() -> str:

@@ -1,5 +1,6 @@
 """Reading an MCAP artifact: checked, versioned, and refused in words when damaged."""
 
+import io
 import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,9 +9,19 @@ from typing import Any, TypeVar
 
 import zstandard
 from google.protobuf.message import DecodeError, Message
+from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
-from mcap.reader import McapReader, make_reader
+from mcap.reader import make_reader
+from mcap.records import Attachment, Statistics
+from mcap.summary import Summary
 
+from pipeline.artifacts.bounds import (
+    BoundedFile,
+    check_chunk,
+    check_data,
+    check_index,
+    checked_attachment,
+)
 from pipeline.artifacts.provenance import METADATA_NAME, Provenance
 from pipeline.errors import ArtifactError
 
@@ -37,9 +48,14 @@ DAMAGE = (
 class Artifact:
     """One open MCAP artifact."""
 
-    def __init__(self, path: Path, reader: McapReader) -> None:
-        self.path = path
-        self._reader = reader
+    def __init__(self, file: BoundedFile) -> None:
+        self.path = file.path
+        self._file = file
+        with _named(self.path):
+            check_index(file)
+            self._reader = make_reader(file, validate_crcs=True)
+            self._summary, self._statistics = _index_of(file, self._reader.get_summary())
+        self._checked_chunks: set[int] = set()
         self.provenance = self._read_provenance()
 
     def messages(
@@ -58,6 +74,7 @@ class Artifact:
         if not topics:
             return
         with _named(self.path):
+            self._check_chunks(at_ns)
             for schema, channel, message in self._reader.iter_messages(
                 topics=topics,
                 starting_at=at_ns,
@@ -85,24 +102,46 @@ class Artifact:
     def attachment(self, name: str) -> bytes:
         """The bytes attached under a name."""
         with _named(self.path):
-            for attachment in self._reader.iter_attachments():
-                if attachment.name == name:
-                    return bytes(attachment.data)
+            for index in self._summary.attachment_indexes:
+                if index.name == name:
+                    record = io.BytesIO(checked_attachment(self._file, index))
+                    return bytes(Attachment.read(ReadDataStream(record)).data)
         raise ArtifactError(f"{self.path} has no attachment '{name}'", "Make the file again")
+
+    def attachment_sizes(self) -> dict[str, int]:
+        """Name → bytes of every attachment."""
+        return {index.name: index.data_size for index in self._summary.attachment_indexes}
 
     def counts(self) -> dict[str, tuple[str, int]]:
         """Topic → (schema name, messages)."""
+        counts = self._statistics.channel_message_counts
         with _named(self.path):
-            summary = self._reader.get_summary()
-        if summary is None or summary.statistics is None:
-            return {}
-        return {
-            channel.topic: (
-                summary.schemas[channel.schema_id].name,
-                summary.statistics.channel_message_counts.get(channel.id, 0),
-            )
-            for channel in summary.channels.values()
-        }
+            return {
+                channel.topic: (
+                    self._summary.schemas[channel.schema_id].name,
+                    counts.get(channel.id, 0),
+                )
+                for channel in self._summary.channels.values()
+            }
+
+    def check(self) -> None:
+        """Hold every byte of the file against its checksums; reads all of it.
+
+        Raises
+        ------
+        ArtifactError : something is damaged.
+        """
+        with _named(self.path):
+            check_data(self._file)
+
+    def _check_chunks(self, at_ns: int | None) -> None:
+        """Refuse chunks that declare what must not be allocated, before they are read."""
+        for index in self._summary.chunk_indexes:
+            start = index.chunk_start_offset
+            wanted = at_ns is None or index.message_start_time <= at_ns <= index.message_end_time
+            if wanted and start not in self._checked_chunks:
+                check_chunk(self._file, index)
+                self._checked_chunks.add(start)
 
     def _topics_of(self, schema_name: str) -> list[str]:
         base, _, short = schema_name.rpartition(".")
@@ -137,7 +176,7 @@ def open_artifact(path: Path) -> Iterator[Artifact]:
     ArtifactError : missing, not an MCAP, damaged, or of another version.
     """
     try:
-        file = path.open("rb")
+        file = BoundedFile(path)
     except FileNotFoundError as error:
         raise ArtifactError(
             f"{path} does not exist", "Run the stage that makes it (see 'make help')"
@@ -147,15 +186,22 @@ def open_artifact(path: Path) -> Iterator[Artifact]:
             f"{path} cannot be read: {error.strerror}", "Mend its access"
         ) from error
     with file:
-        with _named(path):
-            reader = make_reader(file, validate_crcs=True)
-        yield Artifact(path, reader)
+        yield Artifact(file)
 
 
 def read_provenance(path: Path) -> Provenance:
     """The provenance record of a file."""
     with open_artifact(path) as artifact:
         return artifact.provenance
+
+
+def _index_of(file: BoundedFile, summary: Summary | None) -> tuple[Summary, Statistics]:
+    """The index with its counts; without it the library would read on, checking nothing."""
+    if summary is None or summary.statistics is None:
+        raise file.damaged("it has no index")
+    if summary.statistics.message_count and not summary.chunk_indexes:
+        raise file.damaged("its index names no chunk, and it holds messages")
+    return summary, summary.statistics
 
 
 @contextmanager

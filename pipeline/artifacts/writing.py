@@ -10,10 +10,12 @@ from mcap.well_known import MessageEncoding
 from mcap.writer import CompressionType, Writer
 from mcap_protobuf.schema import register_schema
 
+from pipeline.artifacts.bounds import MOST_CHUNK_BYTES
 from pipeline.artifacts.provenance import METADATA_NAME, Provenance
 from pipeline.artifacts.publishing import published
 from pipeline.errors import ArtifactError
 
+CHUNK_BYTES = 1 << 20  # a chunk is closed once it holds more
 Compression = Literal["zstd", "lz4", "none"]
 COMPRESSIONS = {
     "zstd": CompressionType.ZSTD,
@@ -42,7 +44,12 @@ class ArtifactWriter:
         self._stack = ExitStack()
         scratch = self._stack.enter_context(published(self._path))
         self._file: BinaryIO = self._stack.enter_context(scratch.open("wb"))
-        self._writer = Writer(self._file, compression=self._compression, enable_data_crcs=True)
+        self._writer = Writer(
+            self._file,
+            chunk_size=CHUNK_BYTES,
+            compression=self._compression,
+            enable_data_crcs=True,
+        )
         self._writer.start(profile="", library="softgrip")
         self._writer.add_metadata(METADATA_NAME, self._provenance.to_metadata())
         return self
@@ -52,7 +59,8 @@ class ArtifactWriter:
 
         Raises
         ------
-        ArtifactError : the topic already carries another message type.
+        ArtifactError : the topic already carries another message type, or the message is larger
+            than readers accept.
         """
         name = message.DESCRIPTOR.full_name
         channel, carried = self._channels.get(topic, (0, name))
@@ -60,6 +68,13 @@ class ArtifactWriter:
             raise ArtifactError(
                 f"{self._path}: topic '{topic}' carries {carried} and cannot take a {name}",
                 "Write it on a topic of its own",
+            )
+        # Without "deterministic", map fields may come out in another order on another run.
+        data = message.SerializeToString(deterministic=True)
+        if len(data) > MOST_CHUNK_BYTES - CHUNK_BYTES:
+            raise ArtifactError(
+                f"{self._path}: a {name} of {len(data)} bytes is more than a reader accepts",
+                "Put less into one message",
             )
         if topic not in self._channels:
             if name not in self._schemas:
@@ -74,8 +89,7 @@ class ArtifactWriter:
             channel_id=channel,
             log_time=log_time_ns,
             publish_time=log_time_ns,
-            # Without it, map fields may come out in another order on another run.
-            data=message.SerializeToString(deterministic=True),
+            data=data,
         )
 
     def attach(self, name: str, media_type: str, data: bytes) -> None:

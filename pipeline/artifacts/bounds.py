@@ -1,0 +1,160 @@
+"""What an MCAP declares of its own sizes and checksums, held against the file before it is trusted.
+
+The library's reader allocates what a record declares, and of all checksums it looks at those of
+chunks alone. Here a declared size is refused before it is allocated, and the index section, an
+attachment and the data section as a whole are held against their checksums.
+"""
+
+import io
+import struct
+import zlib
+from pathlib import Path
+
+import lz4.frame
+import zstandard
+from mcap.opcode import Opcode
+from mcap.records import AttachmentIndex, ChunkIndex
+
+from pipeline.errors import ArtifactError
+
+MOST_CHUNK_BYTES = 256 * 2**20  # uncompressed; a writer refuses larger messages
+
+MAGIC = b"\x89MCAP0\r\n"
+FOOTER = struct.Struct("<BQQQI")  # opcode, length, summary start, offset start, CRC
+DATA_END = struct.Struct("<BQI")  # opcode, length, CRC
+CHUNK_HEAD = struct.Struct("<BQQQQII")  # opcode, length, times, size, CRC, length of the next name
+RECORD_HEAD_BYTES = 9
+CRC_BYTES = 4
+FRAME_HEAD_BYTES = 32  # more than the header of a zstd or lz4 frame
+SMALL_READ_BYTES = 1 << 16
+BLOCK_BYTES = 1 << 20
+
+REMEDY = "Delete it and run the same command again"
+
+
+class BoundedFile(io.BufferedReader):
+    """A file that refuses a read beyond its end instead of allocating for it."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(io.FileIO(path))
+        self.path = path
+        self.size = path.stat().st_size
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        """As of any file.
+
+        Raises
+        ------
+        ArtifactError : more than a small piece is asked for and the file does not hold it.
+        """
+        if size is not None and size > SMALL_READ_BYTES and size > self.size - self.tell():
+            raise self.damaged(f"it declares {size} bytes where {self.size - self.tell()} are left")
+        return super().read(size)
+
+    def read_at(self, offset: int, size: int) -> bytes:
+        """Exactly ``size`` bytes from ``offset``."""
+        if not 0 <= offset <= self.size - size:
+            raise self.damaged(f"it points to bytes {offset} to {offset + size} of {self.size}")
+        self.seek(offset)
+        return self.read(size)
+
+    def damaged(self, reason: str) -> ArtifactError:
+        """The error that names this file."""
+        return ArtifactError(f"{self.path} is damaged ({reason})", REMEDY)
+
+
+def check_index(file: BoundedFile) -> int:
+    """Where the index (summary) section starts.
+
+    Raises
+    ------
+    ArtifactError : the file is no MCAP, is cut short, or its index fails its checksum.
+    """
+    start, footer_at, stored = _footer(file)
+    index = file.read_at(start, footer_at - start + FOOTER.size - CRC_BYTES)
+    if zlib.crc32(index) != stored:
+        raise file.damaged("its index does not match its checksum")
+    file.seek(0)
+    return start
+
+
+def check_data(file: BoundedFile) -> None:
+    """Hold every byte of the data section against its checksum; reads the whole file.
+
+    Raises
+    ------
+    ArtifactError : they do not match.
+    """
+    end = check_index(file) - DATA_END.size
+    opcode, length, stored = DATA_END.unpack(file.read_at(end, DATA_END.size))
+    if opcode != Opcode.DATA_END or length != CRC_BYTES or stored == 0:
+        raise file.damaged("its data section has no checksum")
+    file.seek(0)
+    found, left = 0, end
+    while left > 0:
+        block = file.read(min(left, BLOCK_BYTES))
+        found, left = zlib.crc32(block, found), left - len(block)
+    if found != stored:
+        raise file.damaged("its data section does not match its checksum")
+
+
+def check_chunk(file: BoundedFile, index: ChunkIndex) -> None:
+    """Hold what a chunk declares against the file and the largest chunk there may be.
+
+    Raises
+    ------
+    ArtifactError : it would decompress to more than ``MOST_CHUNK_BYTES``, or contradicts itself.
+    """
+    head = file.read_at(index.chunk_start_offset, CHUNK_HEAD.size)
+    opcode, length, _, _, declared, _, name_bytes = CHUNK_HEAD.unpack(head)
+    if opcode != Opcode.CHUNK or length > file.size or name_bytes > length:
+        raise file.damaged("its index points to no chunk")
+    if declared > MOST_CHUNK_BYTES:
+        raise file.damaged(
+            f"a chunk declares {declared} bytes, more than the {MOST_CHUNK_BYTES} allowed"
+        )
+    compression = file.read(name_bytes).decode()
+    (stored,) = struct.unpack("<Q", file.read(8))
+    if stored > length:
+        raise file.damaged("a chunk declares more than its record holds")
+    found = _content_bytes(compression, file.read(min(stored, FRAME_HEAD_BYTES)), stored)
+    if found is not None and found != declared:
+        raise file.damaged(f"a chunk declares {declared} bytes and its content {found}")
+
+
+def checked_attachment(file: BoundedFile, index: AttachmentIndex) -> bytes:
+    """The record of an attachment, without its head.
+
+    Raises
+    ------
+    ArtifactError : it fails its checksum.
+    """
+    record = file.read_at(index.offset, index.length)
+    body, stored = record[RECORD_HEAD_BYTES:-CRC_BYTES], record[-CRC_BYTES:]
+    if zlib.crc32(body) != int.from_bytes(stored, "little"):
+        raise file.damaged(f"attachment '{index.name}' does not match its checksum")
+    return record[RECORD_HEAD_BYTES:]
+
+
+def _footer(file: BoundedFile) -> tuple[int, int, int]:
+    """Start of the index, start of the footer, and the checksum over both."""
+    footer_at = file.size - FOOTER.size - len(MAGIC)
+    if footer_at < len(MAGIC) or file.read_at(0, len(MAGIC)) != MAGIC:
+        raise file.damaged("it is no MCAP file")
+    opcode, _, start, _, stored = FOOTER.unpack(file.read_at(footer_at, FOOTER.size))
+    if opcode != Opcode.FOOTER or file.read(len(MAGIC)) != MAGIC:
+        raise file.damaged("it is cut short: its footer is missing")
+    if not len(MAGIC) + DATA_END.size <= start < footer_at or stored == 0:
+        raise file.damaged("it has no index, or one without a checksum")
+    return start, footer_at, stored
+
+
+def _content_bytes(compression: str, head: bytes, stored: int) -> int | None:
+    """Size of a chunk's content as its frame declares it; None where it declares none."""
+    if compression == "zstd":
+        size = zstandard.frame_content_size(head)
+        return None if size < 0 else size
+    if compression == "lz4":
+        declared: int = lz4.frame.get_frame_info(head)["content_size"]
+        return declared or None
+    return stored

@@ -1,0 +1,133 @@
+"""What an artifact says of itself, and whether what it was made from is still what is there."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from pipeline.artifacts.provenance import Input, Provenance
+from pipeline.artifacts.publishing import file_sha256
+from pipeline.artifacts.reading import open_artifact
+from pipeline.errors import ArtifactError
+from schemas.softgrip.v1.grasps_pb2 import ShardIndex
+
+MESHES = "meshes/"  # inputs of this name lie in the mesh folder, all others in the run's
+RUN_FILE = "run.toml"
+INDEX_NAME = ShardIndex.DESCRIPTOR.full_name
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What an artifact says of itself.
+
+    counts : topic → (schema, messages). shards : file → samples, of a sharded artifact's index.
+    """
+
+    path: Path
+    size_bytes: int
+    provenance: Provenance
+    counts: dict[str, tuple[str, int]]
+    attachments: dict[str, int]
+    shards: dict[str, int]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One file held against what is recorded of it; ``problem`` is empty where it agrees."""
+
+    path: Path
+    problem: str = ""
+
+
+def contents_of(path: Path) -> Contents:
+    """Provenance, schemas, counts, attachments and shards.
+
+    Raises
+    ------
+    ArtifactError : the file is missing, damaged or of another version.
+    """
+    with open_artifact(path) as artifact:
+        counts = artifact.counts()
+        sharded = any(schema == INDEX_NAME for schema, _ in counts.values())
+        return Contents(
+            path=path,
+            size_bytes=path.stat().st_size,
+            provenance=artifact.provenance,
+            counts=dict(sorted(counts.items())),
+            attachments=artifact.attachment_sizes(),
+            shards={s.path: s.samples for s in artifact.one(ShardIndex).shards} if sharded else {},
+        )
+
+
+def verified(path: Path, mesh_dir: Path | None) -> Iterator[Finding]:
+    """Hold a file and, up the chain to the meshes, everything it was made from against its digest.
+
+    Every byte of every artifact is read. A file is looked at once, however many name it.
+    """
+    run = run_folder(path)
+    digests: dict[Path, str] = {}
+
+    def digest(file: Path) -> str:
+        return digests.setdefault(file, file_sha256(file))
+
+    waiting, seen = [path], set()
+    while waiting:
+        file = waiting.pop()
+        if file in seen:
+            continue
+        seen.add(file)
+        try:
+            inputs, shards = _named_by(file)
+        except ArtifactError as error:
+            yield Finding(file, str(error))
+            continue
+        yield Finding(file)
+        for entry in shards:
+            found = _compared(entry, file.parent, file, digest)
+            yield found
+            if not found.problem:
+                waiting.append(found.path)
+        for entry in inputs:
+            is_mesh = entry.path.startswith(MESHES)
+            if is_mesh and mesh_dir is None:
+                yield Finding(Path(entry.path), "not compared: name the folder by --mesh-dir")
+                continue
+            named = Input(entry.path.removeprefix(MESHES), entry.sha256) if is_mesh else entry
+            folder = mesh_dir if is_mesh and mesh_dir is not None else run
+            found = _compared(named, folder, file, digest)
+            if found.problem or is_mesh:
+                yield found
+            else:
+                waiting.append(found.path)
+
+
+def run_folder(path: Path) -> Path:
+    """The folder of the run a file belongs to: the nearest one with a run.toml, else its own."""
+    for folder in path.resolve().parents:
+        if (folder / RUN_FILE).is_file():
+            return folder
+    return path.resolve().parent
+
+
+def _named_by(file: Path) -> tuple[tuple[Input, ...], list[Input]]:
+    """What a whole file names: what it was made from, and its shards."""
+    with open_artifact(file) as artifact:
+        artifact.check()
+        shards: list[Input] = []
+        if any(schema == INDEX_NAME for schema, _ in artifact.counts().values()):
+            shards = [Input(s.path, s.sha256) for s in artifact.one(ShardIndex).shards]
+        return artifact.provenance.inputs, shards
+
+
+def _compared(entry: Input, folder: Path, by: Path, digest: Callable[[Path], str]) -> Finding:
+    path = folder / entry.path
+    if not path.resolve().is_relative_to(folder.resolve()):
+        return Finding(path, f"{by.name} names it, and it leads out of {folder}")
+    if not path.is_file():
+        return Finding(path, f"missing, though {by.name} was made from it")
+    if (found := digest(path)) != entry.sha256:
+        return Finding(
+            path,
+            f"changed since {by.name} was made: SHA-256 was {entry.sha256[:12]}, "
+            f"is {found[:12]}; make {by.name} again",
+        )
+    return Finding(path)
