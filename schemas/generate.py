@@ -1,7 +1,7 @@
 """Regenerate the *_pb2 modules from the .proto sources: ``python -m schemas.generate``.
 
 With ``--check`` nothing is written; the exit code says whether what is checked
-in is what the sources give.
+in is what the sources give, and whether it still reads what was released.
 """
 
 import sys
@@ -10,6 +10,8 @@ from importlib.resources import files
 from pathlib import Path
 
 from grpc_tools import protoc
+
+from schemas import compatibility
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -48,7 +50,7 @@ def main() -> int:
         ]
     for name in stale:
         sys.stderr.write(f"{name} is not what its .proto gives: run 'python -m schemas.generate'\n")
-    return 1 if stale else 0
+    return 1 if stale else compatibility.main()
 
 
 if __name__ == "__main__":
