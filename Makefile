@@ -28,7 +28,7 @@ ifeq (,$(strip $(WORKERS)))
 unexport WORKERS
 endif
 
-.PHONY: help dataset objects scenes grasps shards train eval evaluate status doctor setup test bench gallery review lint clean FORCE
+.PHONY: help dataset objects scenes grasps shards train eval evaluate status doctor setup reader test bench gallery review lint clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -74,10 +74,18 @@ setup: .venv/.ready  ## virtual environment, pinned packages, Vulkan driver
 	@$(PY) -m pipeline.machine.vulkan_driver
 	@touch $@
 
+# The MCAP project's own TypeScript reader, by which the tests check what we write.
+NODE_READER := tests/artifacts/node/node_modules/.package-lock.json
+reader: $(NODE_READER)
+$(NODE_READER): tests/artifacts/node/package-lock.json
+	@if command -v npm >/dev/null; then \
+	  npm ci --prefix $(<D) --ignore-scripts --no-audit --no-fund --silent && touch $@; \
+	else echo "npm is not installed: artifacts are not checked by the TypeScript reader"; fi
+
 doctor:  ## what is present, what is missing, how to mend it
 	@$$(test -x $(PY) && echo $(PY) || echo $(PYTHON3)) -m pipeline.machine.doctor
 
-test: .venv/.ready lint  ## lint, types, tests
+test: .venv/.ready lint reader  ## lint, types, tests
 	$(PY) -m pytest
 
 bench: .venv/.ready  ## speed of labelling, QP, storage and control, to runs/bench/bench.json

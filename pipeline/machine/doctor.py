@@ -51,6 +51,19 @@ def check_tools() -> Finding:
     return Finding("tools", "make and a C compiler are there")
 
 
+def check_readers() -> Finding:
+    """Readers of MCAP in other languages, by which the tests check artifacts."""
+    missing = []
+    if shutil.which("node") is None or shutil.which("npm") is None:
+        missing.append("apt-get install nodejs npm, then 'make reader'")
+    elif not (ROOT / "tests/artifacts/node/node_modules").is_dir():
+        missing.append("run 'make reader'")
+    if missing:
+        return Finding("MCAP in TypeScript", "not installed, its tests are skipped", missing[0])
+    go = "the mcap command line as well" if shutil.which("mcap") else "no mcap command line"
+    return Finding("MCAP in TypeScript", f"installed; {go}")
+
+
 def check_venv() -> Finding:
     """The virtual environment and its pins."""
     if not (ROOT / ".venv/.ready").is_file():
@@ -112,6 +125,7 @@ CHECKS: tuple[Callable[[], Finding], ...] = (
     check_python,
     check_tools,
     check_venv,
+    check_readers,
     check_driver,
     check_rendering,
     check_room,
