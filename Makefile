@@ -4,6 +4,7 @@
 #   MESH_DIR=path  folder of meshes for the dataset  (default: the embedded object set)
 #   WORKERS=n      worker processes                  (default: all cores)
 #   EXECUTOR=ray   on an existing Ray cluster        (default: local processes)
+#   RANKS=n        processes that train one network  (default: 1; a GPU each where there are any)
 
 RUN     ?= default
 PYTHON3 ?= python3
@@ -28,7 +29,7 @@ ifeq (,$(strip $(WORKERS)))
 unexport WORKERS
 endif
 
-.PHONY: help dataset objects scenes grasps shards train eval evaluate status doctor setup reader test bench gallery review lint clean FORCE
+.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery review lint clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -41,6 +42,9 @@ train: $(R)/train.mcap  ## GA-CNN on the dataset
 eval: $(R)/evaluate.mcap  ## closed-loop success by level
 	@$(PY) -m stages.evaluate --table
 
+sweep: $(R)/sweep.mcap  ## the GA-CNN family compared (Fig. 1), and what its parts buy
+	@$(PY) -m stages.graph fresh sweep
+
 objects: $(R)/objects.mcap  ## stage 1: meshes to catalogue
 scenes: $(R)/scenes.mcap  ## stage 2: clutter, settled and rendered
 grasps: $(R)/grasps.mcap  ## stage 3: labelled grasps
@@ -51,6 +55,12 @@ evaluate: eval
 $(R)/%.mcap: $(STATE)/%.key
 	@$(PY) -m stages.$* --run $(RUN)
 
+# Several processes train one network where RANKS says so.
+ifneq (,$(strip $(RANKS)))
+$(R)/train.mcap: $(STATE)/train.key
+	@$(PY) -m torch.distributed.run --standalone --nproc-per-node=$(RANKS) -m stages.train --run $(RUN)
+endif
+
 # A key file is looked at every time and rewritten only when its digest changed.
 $(STATE)/%.key: .venv/.ready FORCE
 	@$(PY) -m stages.graph key $*
@@ -59,6 +69,7 @@ $(STATE)/grasps.key: $(R)/scenes.mcap
 $(STATE)/shards.key: $(R)/grasps.mcap
 $(STATE)/train.key: $(R)/shards.mcap
 $(STATE)/evaluate.key: $(R)/train.mcap
+$(STATE)/sweep.key: $(R)/shards.mcap
 .PRECIOUS: $(STATE)/%.key $(R)/%.mcap
 FORCE:
 

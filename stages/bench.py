@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import torch
 
 from pipeline.artifacts import ArtifactWriter, publish_bytes
 from pipeline.artifacts.grasp_messages import grasp_batch
@@ -21,6 +20,7 @@ from pipeline.artifacts.object_messages import read_objects
 from pipeline.artifacts.sample_messages import Samples
 from pipeline.artifacts.scene_messages import read_scenes
 from pipeline.benchmarks import clutter, control, labelling, solvers, storage
+from pipeline.benchmarks import loading as batches
 from pipeline.benchmarks.clock import Laps
 from pipeline.clutter.scene import ClutterScene
 from pipeline.config import RunConfig, load_run_config
@@ -30,8 +30,10 @@ from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.shape import ShapeClass
 from pipeline.gripper.heights import pad_heights
-from pipeline.network.export import OnnxPredictor, export_onnx_bytes
-from pipeline.network.ga_cnn import GaCnn
+from pipeline.network.export import OnnxPredictor, checked_against, export_onnx_bytes
+from pipeline.network.ga_cnn import GaCnn, build_network
+from pipeline.network.inference import predict
+from pipeline.network.timing import milliseconds_a_grasp
 from pipeline.sensing.depth_noise import disturb
 from pipeline.sensing.sub_cloud import sub_clouds
 from stages.graph import RUNS_DIR
@@ -49,7 +51,7 @@ LATENCY_GRASPS = 1000
 MESH_GRASPS = 2048
 STORED_SAMPLES = 8192
 CONTROL_STEPS = 60
-CONTROL_THREADS = 2
+NETWORK_THREADS = 2
 PROBLEMS: dict[SolverName, int] = {"structured": 2000, "piqp-sparse": 200, "piqp-dense": 12}
 WORKER_SECONDS = 6.0
 PILES = 5
@@ -85,6 +87,8 @@ def main() -> int:
         quadratic_programs,
         scaling,
         storing,
+        loading,
+        inference,
         control_steps,
         settling,
     ):
@@ -235,26 +239,8 @@ def worker_rate(job: WorkerJob) -> float:
 
 def storing(bench: Bench) -> dict[str, object]:
     """MCAP against HDF5, Zarr, WebDataset and NumPy on the same samples."""
-    rng = np.random.default_rng(0)
-    wanted = STORED_SAMPLES // len(bench.scenes)
-    grasps = [
-        part
-        for scene in bench.scenes
-        for _, part in synthesize(scene, bench.meshes, bench.config, wanted, rng)
-    ]
-    cloud = np.concatenate([part.cloud for part in grasps])
-    count = len(cloud)
-    samples = Samples(
-        cloud=cloud,
-        cloud_mask=np.concatenate([part.cloud_mask for part in grasps]),
-        quality=np.concatenate([part.quality for part in grasps]),
-        object_index=np.zeros(count, dtype=np.int64),
-        shape_class=np.zeros(count, dtype=np.int64),
-        level=np.ones(count, dtype=np.int64),
-        pressure=np.concatenate([part.pressure for part in grasps]),
-    )
     with tempfile.TemporaryDirectory() as scratch:
-        figures = storage.against_peers(samples, Path(scratch))
+        figures = storage.against_peers(stored_samples(bench), Path(scratch))
     peers = [name for name in figures if name != "mcap"]
     return {
         "storage": {
@@ -271,12 +257,76 @@ def storing(bench: Bench) -> dict[str, object]:
     }
 
 
+def stored_samples(bench: Bench) -> Samples:
+    """Labelled samples of the run's scenes."""
+    rng = np.random.default_rng(0)
+    wanted = STORED_SAMPLES // len(bench.scenes)
+    grasps = [
+        part
+        for scene in bench.scenes
+        for _, part in synthesize(scene, bench.meshes, bench.config, wanted, rng)
+    ]
+    cloud = np.concatenate([part.cloud for part in grasps])
+    count = len(cloud)
+    return Samples(
+        cloud=cloud,
+        cloud_mask=np.concatenate([part.cloud_mask for part in grasps]),
+        quality=np.concatenate([part.quality for part in grasps]),
+        object_index=np.zeros(count, dtype=np.int64),
+        shape_class=np.zeros(count, dtype=np.int64),
+        level=np.ones(count, dtype=np.int64),
+        pressure=np.concatenate([part.pressure for part in grasps]),
+    )
+
+
+def loading(bench: Bench) -> dict[str, object]:
+    """Training's loader against raw memory maps and against other formats."""
+    with tempfile.TemporaryDirectory() as scratch:
+        rates = batches.rates_mb_s(stored_samples(bench), Path(scratch))
+    return {
+        "loader_mb_s": {name: round(rate) for name, rate in rates.items()},
+        "loader_vs_memory_map": round(rates["epoch"] / rates["memory_map"], 2),
+        "loader_vs": {name: round(rates["epoch"] / rates[name], 2) for name in batches.PEERS},
+        "first_pass_vs": {
+            name: round(rates["first_pass"] / rates[name], 2) for name in batches.PEERS
+        },
+    }
+
+
+def inference(bench: Bench) -> dict[str, object]:
+    """Milliseconds a grasp at the network's full size, as control asks and as training does."""
+    network, exported = sized_network(bench)
+    samples = stored_samples(bench)
+    cloud, mask = samples.cloud[:512], samples.cloud_mask[:512]
+    runtimes = {
+        "onnx": exported.predict,
+        "pytorch": lambda clouds, masks, size: predict(
+            network, clouds, masks, size, NETWORK_THREADS, average_symmetries=False
+        ),
+    }
+    times = {name: milliseconds_a_grasp(run, cloud, mask) for name, run in runtimes.items()}
+    return {
+        "inference_ms_a_grasp": {
+            name: {size: round(value, 3) for size, value in found.items()}
+            for name, found in times.items()
+        },
+        "inference_layers": bench.config.network.layers,
+        "inference_difference": checked_against(
+            exported, network, cloud, mask, 64, NETWORK_THREADS
+        ),
+    }
+
+
+def sized_network(bench: Bench) -> tuple[GaCnn, OnnxPredictor]:
+    """The network of the run and its export; its weights are untrained and change no time."""
+    network = build_network(bench.config.network, seed=0).eval()
+    threads = min(NETWORK_THREADS, os.cpu_count() or 1)
+    return network, OnnxPredictor(export_onnx_bytes(network), threads)
+
+
 def control_steps(bench: Bench) -> dict[str, object]:
     """The closed loop's step with the network at its full size; its weights change no time."""
-    torch.manual_seed(0)
-    network = OnnxPredictor(
-        export_onnx_bytes(GaCnn(bench.config.network)), min(CONTROL_THREADS, os.cpu_count() or 1)
-    )
+    _, network = sized_network(bench)
     scene = bench.scenes[-1]
     depth = disturb(scene.views[0], np.random.default_rng(0))
     found = control.step_ms(scene, depth, network, bench.config, CONTROL_STEPS)

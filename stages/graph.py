@@ -1,4 +1,4 @@
-"""The six stages as data, and what Make asks about them.
+"""The six stages as data, the study beside them, and what Make asks about them.
 
 ``python -m stages.graph key STAGE`` rewrites a stage's key file only when its
 digest changed; ``status`` says what is stale and why.
@@ -36,6 +36,10 @@ EVALUATE = Stage(
 )
 STAGES = {stage.name: stage for stage in (OBJECTS, SCENES, GRASPS, SHARDS, TRAIN, EVALUATE)}
 
+# Beside the pipeline: nothing downstream reads it, and it is made only when asked for.
+SWEEP = Stage("sweep", ("seed", "network", "train", "sweep"), ("shards",))
+MADE = {**STAGES, SWEEP.name: SWEEP}
+
 RUNS_DIR = Path("runs")
 
 
@@ -57,7 +61,7 @@ MeshDir = Annotated[Path | None, typer.Option(envvar="MESH_DIR")]
 def key(stage: str, run: RunName = "default", mesh_dir: MeshDir = None) -> None:
     """Rewrite a stage's key file if what it depends on changed."""
     folder = RunFolder(RUNS_DIR / run)
-    context = stage_context(STAGES[stage], folder, inputs_of, mesh_dir, workers=1)
+    context = stage_context(MADE[stage], folder, inputs_of, mesh_dir, workers=1)
     path = folder.state(f"{stage}.key")
     text = context.key.to_json()
     if path.is_file() and path.read_text() == text and not _lost(folder, stage):
@@ -66,7 +70,7 @@ def key(stage: str, run: RunName = "default", mesh_dir: MeshDir = None) -> None:
         for change in context.key.differences(key_from_json(path.read_text())):
             logger.info("{}: {}", stage, change)
     publish_bytes(path, text.encode())
-    if STAGES[stage] is OBJECTS:
+    if MADE[stage] is OBJECTS:
         # What train and eval stay with when they are called without MESH_DIR.
         publish_bytes(folder.state("mesh_dir"), str(mesh_dir or "").encode())
 
@@ -105,7 +109,7 @@ def _staleness(stage: Stage, folder: RunFolder, mesh_dir: Path | None, stale: se
 def _lost(folder: RunFolder, stage: str) -> bool:
     """Whether a shard of a finished stage has gone: Make sees the index alone."""
     index = folder.artifact(stage)
-    return STAGES[stage].sharded and index.is_file() and bool(missing_shards(index))
+    return MADE[stage].sharded and index.is_file() and bool(missing_shards(index))
 
 
 def main() -> None:

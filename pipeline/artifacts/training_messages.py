@@ -10,7 +10,8 @@ from jaxtyping import Float
 
 from pipeline.artifacts.reading import open_artifact
 from pipeline.artifacts.tensors import to_tensor
-from pipeline.network.training import EpochMetrics, TrainedNetwork
+from pipeline.network.resuming import EpochMetrics
+from pipeline.network.training import TrainedNetwork
 from schemas.softgrip.v1.training_pb2 import Epoch, TrainingResult
 
 CHECKPOINT = "ga_cnn.safetensors"
@@ -22,6 +23,8 @@ class TestFigures:
     """The network on held-out objects.
 
     quality, predicted : (n,) q and q-hat. mae : mean |q-hat - q| of Supplement IV.
+    mae_single : the same without averaging over the symmetries. count_by_class : samples.
+    train_count, val_count : samples that the network learned from and was chosen by.
     mean_predictor_mae, seal_ratio_mae : of the baselines. by_class : class name → error.
     by_tenth : error by tenth of q, None where empty.
     calibration : by tenth of q-hat: mean q-hat, mean q (None where empty), count.
@@ -32,11 +35,15 @@ class TestFigures:
     quality: Float[np.ndarray, " n"]
     predicted: Float[np.ndarray, " n"]
     mae: float
+    mae_single: float
     mean_predictor_mae: float
     seal_ratio_mae: float
     by_class: dict[str, float]
+    count_by_class: dict[str, int]
     by_tenth: Sequence[float | None]
     calibration: Sequence[tuple[float | None, float | None, int]]
+    train_count: int
+    val_count: int
 
 
 def epoch_message(metrics: EpochMetrics) -> Epoch:
@@ -47,6 +54,7 @@ def epoch_message(metrics: EpochMetrics) -> Epoch:
         train_mae=metrics.train_mae,
         val_mae=metrics.val_mae,
         learning_rate=metrics.learning_rate,
+        samples=metrics.samples,
     )
 
 
@@ -66,6 +74,11 @@ def result_message(trained: TrainedNetwork, figures: TestFigures) -> TrainingRes
         calibration=to_tensor(np.array([_numbers(row) for row in figures.calibration])),
         test_quality=to_tensor(figures.quality.astype(np.float32)),
         test_prediction=to_tensor(figures.predicted.astype(np.float32)),
+        val_mae=trained.val_mae,
+        test_mae_single=figures.mae_single,
+        test_count_by_class=figures.count_by_class,
+        train_count=figures.train_count,
+        val_count=figures.val_count,
     )
 
 

@@ -14,7 +14,7 @@ from pipeline.config.evaluation import (
     SuctionConfig,
 )
 from pipeline.config.grasps import GraspsConfig, GripperConfig, PadConfig, SensingConfig
-from pipeline.config.learning import NetworkConfig, ShardsConfig, TrainConfig
+from pipeline.config.learning import NetworkConfig, ShardsConfig, SweepConfig, TrainConfig
 from pipeline.config.objects import ConvexPartsConfig, ObjectsConfig, SplitConfig
 from pipeline.config.scenes import ClutterCounts, ScenesConfig
 from pipeline.config.tree import RunConfig, load_run_config, section_digest
@@ -40,6 +40,7 @@ __all__ = [
     "SplitConfig",
     "StaticCameraConfig",
     "SuctionConfig",
+    "SweepConfig",
     "TrainConfig",
     "WristCameraConfig",
     "load_run_config",

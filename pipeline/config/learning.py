@@ -1,4 +1,4 @@
-"""[shards], [network] and [train]: dataset files, GA-CNN and its training."""
+"""[shards], [network], [train] and [sweep]: dataset files, GA-CNN, its training, its family."""
 
 from typing import Literal
 
@@ -43,3 +43,24 @@ class TrainConfig(Section):
     device: Literal["auto", "cpu", "cuda"] = Field(
         "auto", description="'auto' takes a GPU where there is one"
     )
+
+
+class SweepConfig(Section):
+    """The family compared, Fig. 1, and what attention and symmetry buy: one budget for all."""
+
+    depths: tuple[int, ...] = Field(
+        (18, 24, 30, 38, 44, 52, 58, 66, 72, 80, 86, 94, 102),
+        min_length=1,
+        description="weighted layers; IV: from 18 to 102",
+    )
+    channels: tuple[tuple[int, int, int, int], ...] = Field(
+        ((8, 16, 32, 64), (16, 32, 64, 128), (32, 64, 128, 256), (64, 128, 256, 512)),
+        min_length=1,
+        description="channel sets; IV: four, of which 64-128-256-512 was chosen",
+    )
+    ablation_seeds: int = Field(
+        3, ge=0, description="trainings of the run's network with, and without each of its parts"
+    )
+    samples: int = Field(8192, ge=16, description="training samples, the first of their split")
+    held_out_samples: int = Field(4096, ge=16, description="of the val and of the test split, each")
+    epochs: int = Field(6, ge=1, le=10_000, description="passes over the samples")

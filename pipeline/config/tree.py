@@ -18,7 +18,7 @@ from pydantic import Field, ValidationError
 from pipeline.config.cameras import CamerasConfig
 from pipeline.config.evaluation import EvaluateConfig, RecordingConfig
 from pipeline.config.grasps import GraspsConfig, GripperConfig, SensingConfig
-from pipeline.config.learning import NetworkConfig, ShardsConfig, TrainConfig
+from pipeline.config.learning import NetworkConfig, ShardsConfig, SweepConfig, TrainConfig
 from pipeline.config.objects import ObjectsConfig, SplitConfig
 from pipeline.config.scenes import ScenesConfig
 from pipeline.config.section import Section
@@ -39,6 +39,7 @@ class RunConfig(Section):
     shards: ShardsConfig = ShardsConfig()
     network: NetworkConfig = NetworkConfig()
     train: TrainConfig = TrainConfig()
+    sweep: SweepConfig = SweepConfig()
     evaluate: EvaluateConfig = EvaluateConfig()
     recording: RecordingConfig = RecordingConfig()
 

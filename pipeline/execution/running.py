@@ -33,8 +33,12 @@ EXIT_FAILURE = 1
 EXIT_INTERRUPTED = 130
 
 
-def stage_command(stage: Stage, build: Build, inputs_of: InputsOf) -> None:
-    """The command line of a stage's module."""
+def stage_command(stage: Stage, build: Build, inputs_of: InputsOf, rank: int = 0) -> None:
+    """The command line of a stage's module.
+
+    rank : this process's number among several that build together; the first alone holds the
+        run, tells and publishes.
+    """
 
     def command(
         run: Annotated[str, typer.Option(help="name of the run: runs/<run>/run.toml")] = "default",
@@ -52,9 +56,13 @@ def stage_command(stage: Stage, build: Build, inputs_of: InputsOf) -> None:
         force: Annotated[bool, typer.Option(help="run even when nothing changed")] = False,
     ) -> None:
         folder = RunFolder(runs_dir / run)
-        with _readable_failures(stage, folder):
+        with _readable_failures(stage, folder, rank):
             context = stage_context(stage, folder, inputs_of, mesh_dir, workers)
             context = replace(context, executor=executor)
+            if rank > 0:
+                if force or not is_fresh(context):
+                    build(context)
+                return
             with _exclusive(folder, stage):
                 run_stage(context, build, force=force)
 
@@ -168,12 +176,12 @@ def _exclusive(folder: RunFolder, stage: Stage) -> Iterator[None]:
 
 
 @contextmanager
-def _readable_failures(stage: Stage, folder: RunFolder) -> Iterator[None]:
+def _readable_failures(stage: Stage, folder: RunFolder, rank: int) -> Iterator[None]:
     """Every failure ends in one sentence and a non-zero exit; the trace goes to the log."""
     logger.remove()
-    logger.add(sys.stderr, level="INFO", format="{message}")
+    logger.add(sys.stderr, level="ERROR" if rank else "INFO", format="{message}")
     signal.signal(signal.SIGTERM, _as_interrupt)
-    log = folder.log(stage.name)
+    log = folder.log(f"{stage.name}.rank{rank}" if rank else stage.name)
     try:
         if folder.path.is_dir():
             folder.state("").mkdir(parents=True, exist_ok=True)

@@ -5,54 +5,53 @@ square within ``loss_beta`` of the truth (smooth L1): the median it aims at is w
 figure, and the rounded corner keeps the last steps from jumping about zero error.
 
 Everything drawn at random follows from (seed, epoch): the order of the samples and the symmetries
-applied to them. A run killed in an epoch begins that epoch again from the state saved before it,
-and arrives at the same bytes as a run never killed.
+applied to them. A run killed at any batch goes on from the last state saved before it, and arrives
+at the same bytes as a run never killed. Several processes (``parallel``) take the steps that one
+takes, up to rounding.
 """
 
 import json
 import math
 import os
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import torch
 from jaxtyping import Float, Int
 from torch import Tensor, nn
+from torch.nn.parallel import DistributedDataParallel
 
-from pipeline.artifacts.publishing import publish_bytes
 from pipeline.config.learning import NetworkConfig, TrainConfig
-from pipeline.errors import ArtifactError, MachineError
+from pipeline.errors import MachineError
+from pipeline.execution.progress import progress
 from pipeline.network.canonical import SYMMETRIES, apply_symmetry, network_input
-from pipeline.network.checkpoint import tensors_from_bytes, tensors_to_bytes
 from pipeline.network.ga_cnn import GaCnn, build_network
+from pipeline.network.loading import (
+    Waiting,
+    batch_count,
+    epoch_batches,
+    load_batches,
+    part_of_rank,
+)
+from pipeline.network.parallel import ALONE, Ranks, with_synced_norms
+from pipeline.network.resuming import (
+    STATE_FILE,
+    EpochMetrics,
+    Standing,
+    load_standing,
+    save_standing,
+)
 from pipeline.network.samples import GraspTensors
 
-STATE_FILE = "training.safetensors"
 # Rises whenever the loop changes what it computes: a state of another version is not continued.
-STATE_VERSION = 1
+STATE_VERSION = 2
+SAVE_EVERY_S = 120.0  # what a kill may cost; a state of 52 layers takes a third of a second
 
-
-@dataclass(frozen=True)
-class EpochMetrics:
-    """One epoch in figures.
-
-    Attributes
-    ----------
-    epoch : counted from 0.
-    learning_rate : at the epoch's last step.
-    train_loss : mean loss over the epoch's samples, as they were seen (augmented, in training).
-    train_mae : mean |q̂ − q| over the same.
-    val_mae : mean |q̂ − q| over the validation samples after the epoch.
-    """
-
-    epoch: int
-    learning_rate: float
-    train_loss: float
-    train_mae: float
-    val_mae: float
+Batch = tuple[Float[Tensor, "b c h w"], Float[Tensor, " b"]]
 
 
 @dataclass(frozen=True)
@@ -66,6 +65,8 @@ class TrainedNetwork:
     val_mae : that error.
     history : every epoch, those before an interruption too.
     stopped_early : patience ran out before the last epoch.
+    waiting_share : share of this call's steps that was spent waiting for batches; None where no
+        step was left to take.
     """
 
     network: GaCnn
@@ -73,6 +74,7 @@ class TrainedNetwork:
     val_mae: float
     history: tuple[EpochMetrics, ...]
     stopped_early: bool
+    waiting_share: float | None
 
 
 def train(
@@ -83,85 +85,135 @@ def train(
     val_set: GraspTensors,
     state_dir: Path,
     on_epoch: Callable[[EpochMetrics], None],
+    ranks: Ranks = ALONE,
+    loader_workers: int = 0,
+    save_every_s: float = SAVE_EVERY_S,
+    show_progress: bool = False,
 ) -> TrainedNetwork:
     """Train a network; continue where an interrupted call with the same arguments stopped.
 
     Parameters
     ----------
-    state_dir : where the resume state lives. A state of other arguments there is overwritten.
-    on_epoch : called once after each epoch of this call, when its state is safe on disk.
+    state_dir : where the resume state lives, seen by all processes. A state of other arguments
+        there is overwritten.
+    on_epoch : called by the first process after each epoch of this call, when its state is safe.
+    ranks : this process's place among those that train together; all call this alike.
+    loader_workers : processes that read batches ahead; 0 reads them in between.
+    save_every_s : within an epoch the state is saved when so much time has passed.
+    show_progress : a bar an epoch.
 
     Raises
     ------
-    ConfigError : ``network`` names no member of the family.
+    ConfigError : ``network`` names no member of the family, or batches are too small to divide.
     MachineError : ``config.device`` asks for a GPU and there is none.
     ArtifactError : the resume state is damaged.
     """
-    device = chosen_device(config.device)
+    device = chosen_device(config.device, ranks)
     identity = _identity(config, network, seed, train_set, val_set, device)
     with reproducible(config.threads):
         model = build_network(network, seed).to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
+        if ranks.count > 1:
+            with_synced_norms(model)
         optimizer = build_optimizer(model, config)
-        best_weights = _copied_weights(model)
-        history: list[EpochMetrics] = []
-
+        standing = Standing([], _copied_weights(model), 0, _no_sums(device))
         state_path = state_dir / STATE_FILE
         if state_path.exists():
-            history, best_weights = _load_state(
-                state_path, identity, model, optimizer, best_weights
-            )
+            standing = load_standing(state_path, identity, model, optimizer, standing)
+        forward: nn.Module = model
+        if ranks.count > 1:
+            forward = DistributedDataParallel(model, broadcast_buffers=False)
 
-        batches_per_epoch = math.ceil(len(train_set) / config.batch_size)
+        batches_per_epoch = batch_count(len(train_set), config.batch_size)
         total_steps = config.epochs * batches_per_epoch
-        while len(history) < config.epochs and not _patience_ran_out(history, config):
-            epoch = len(history)
+        waiting, saved_at = Waiting(), time.monotonic()
+        while not _finished(standing.history, config):
+            epoch = len(standing.history)
             rng = np.random.default_rng((seed, epoch))
-            loss_sum = error_sum = 0.0
-            rate = 0.0
+            batches = epoch_batches(len(train_set), config.batch_size, rng)
+            symmetry = rng.integers(0, SYMMETRIES, len(train_set)) if config.augment else None
+            mine = part_of_rank(batches, ranks.rank, ranks.count)[standing.batch :]
+            ready = waiting.watch(ready_batches(train_set, mine, symmetry, device, loader_workers))
+            if show_progress and ranks.first:
+                name = f"train: epoch {epoch + 1} of {config.epochs}"
+                ready = iter(progress(ready, len(mine), name, "batch"))
+
             model.train()
-            order = rng.permutation(len(train_set))
-            for batch, indices in enumerate(np.array_split(order, batches_per_epoch)):
-                rate = learning_rate_at(epoch * batches_per_epoch + batch, total_steps, config)
+            for inputs, quality in ready:
+                step = epoch * batches_per_epoch + standing.batch
+                rate = learning_rate_at(step, total_steps, config)
                 for group in optimizer.param_groups:
                     group["lr"] = rate
-                inputs, quality = load_batch(train_set, np.sort(indices), device)
-                if config.augment:
-                    elements = rng.integers(0, SYMMETRIES, size=len(indices))
-                    inputs = apply_symmetry(inputs, torch.from_numpy(elements).to(device))
 
                 with mixed_precision(device):
-                    predicted = model(inputs.contiguous(memory_format=torch.channels_last))
-                loss = nn.functional.smooth_l1_loss(predicted, quality, beta=config.loss_beta)
+                    predicted = forward(inputs)
+                loss = nn.functional.smooth_l1_loss(
+                    predicted, quality, beta=config.loss_beta, reduction="sum"
+                )
                 optimizer.zero_grad(set_to_none=True)
-                loss.backward()
+                # Processes average their gradients: that of the batch's mean is what comes out.
+                (loss * ranks.count / len(batches[standing.batch])).backward()
                 nn.utils.clip_grad_norm_(model.parameters(), config.gradient_norm_max)
                 optimizer.step()
 
-                loss_sum += loss.item() * len(indices)
-                error_sum += (predicted.detach() - quality).abs().sum().item()
+                standing.sums += ranks.summed(_sums(loss, predicted, quality))
+                standing.batch += 1
+                if ranks.first and time.monotonic() - saved_at >= save_every_s:
+                    save_standing(state_path, identity, model, optimizer, standing)
+                    saved_at = time.monotonic()
 
+            loss_sum, error_sum, seen = standing.sums.tolist()
             metrics = EpochMetrics(
                 epoch=epoch,
-                learning_rate=rate,
-                train_loss=loss_sum / len(train_set),
-                train_mae=error_sum / len(train_set),
-                val_mae=_mean_absolute_error(model, val_set, config.batch_size, device),
+                learning_rate=learning_rate_at(
+                    (epoch + 1) * batches_per_epoch - 1, total_steps, config
+                ),
+                train_loss=loss_sum / seen,
+                train_mae=error_sum / seen,
+                val_mae=_mean_absolute_error(model, val_set, config.batch_size, device, ranks),
+                samples=round(seen),
             )
-            if not history or metrics.val_mae < min(past.val_mae for past in history):
-                best_weights = _copied_weights(model)
-            history.append(metrics)
-            _save_state(state_path, identity, model, optimizer, best_weights, history)
-            on_epoch(metrics)
+            if metrics.val_mae < min((past.val_mae for past in standing.history), default=math.inf):
+                standing.best_weights = _copied_weights(model)
+            standing.history.append(metrics)
+            standing.batch, standing.sums = 0, _no_sums(device)
+            if ranks.first:
+                save_standing(state_path, identity, model, optimizer, standing)
+                saved_at = time.monotonic()
+                on_epoch(metrics)
 
-        model.load_state_dict(best_weights)
-    best = min(history, key=lambda metrics: metrics.val_mae)
+    best = min(standing.history, key=lambda metrics: metrics.val_mae)
+    trained = build_network(network, seed)
+    trained.load_state_dict(standing.best_weights)
     return TrainedNetwork(
-        network=model.cpu().eval(),
+        network=trained.eval(),
         best_epoch=best.epoch,
         val_mae=best.val_mae,
-        history=tuple(history),
-        stopped_early=len(history) < config.epochs,
+        history=tuple(standing.history),
+        stopped_early=len(standing.history) < config.epochs,
+        waiting_share=waiting.share(),
     )
+
+
+def ready_batches(
+    samples: GraspTensors,
+    batches: list[Int[np.ndarray, " b"]],
+    symmetry: Int[np.ndarray, " n"] | None,
+    device: torch.device,
+    loader_workers: int,
+) -> Iterator[Batch]:
+    """Canonical inputs and qualities on the device, batch by batch.
+
+    symmetry : for each sample of the set the element that turns or mirrors it.
+    """
+    for indices, cloud, mask, quality in load_batches(
+        samples, batches, loader_workers, pinned=device.type == "cuda"
+    ):
+        inputs = network_input(
+            cloud.to(device, non_blocking=True), mask.to(device, non_blocking=True)
+        )
+        if symmetry is not None:
+            inputs = apply_symmetry(inputs, torch.from_numpy(symmetry[indices]).to(device))
+        yield inputs.contiguous(memory_format=torch.channels_last), quality.to(device)
 
 
 def learning_rate_at(step: int, total_steps: int, config: TrainConfig) -> float:
@@ -183,18 +235,8 @@ def build_optimizer(model: GaCnn, config: TrainConfig) -> torch.optim.AdamW:
     return torch.optim.AdamW(groups, lr=config.learning_rate, fused=True)
 
 
-def load_batch(
-    samples: GraspTensors, indices: Int[np.ndarray, " b"], device: torch.device
-) -> tuple[Float[Tensor, "b c h w"], Float[Tensor, " b"]]:
-    """Canonical inputs and qualities of some samples; sorted indices read a mapped file best."""
-    cloud = torch.from_numpy(samples.cloud[indices]).to(device)
-    mask = torch.from_numpy(samples.mask[indices]).to(device)
-    quality = torch.from_numpy(samples.quality[indices].astype(np.float32)).to(device)
-    return network_input(cloud, mask), quality
-
-
-def chosen_device(wanted: str) -> torch.device:
-    """The device to train on.
+def chosen_device(wanted: str, ranks: Ranks) -> torch.device:
+    """The device to train on: the GPU of this process's number, or the CPU.
 
     Raises
     ------
@@ -205,7 +247,9 @@ def chosen_device(wanted: str) -> torch.device:
         raise MachineError(
             "train.device = 'cuda', and PyTorch finds no GPU", "Choose 'auto' or 'cpu'."
         )
-    return torch.device("cuda" if available and wanted != "cpu" else "cpu")
+    return (
+        torch.device("cuda", ranks.local) if available and wanted != "cpu" else torch.device("cpu")
+    )
 
 
 def mixed_precision(device: torch.device) -> torch.autocast:
@@ -229,25 +273,41 @@ def reproducible(threads: int) -> Iterator[None]:
 
 
 def _mean_absolute_error(
-    model: GaCnn, samples: GraspTensors, batch_size: int, device: torch.device
+    model: GaCnn, samples: GraspTensors, batch_size: int, device: torch.device, ranks: Ranks
 ) -> float:
+    """Mean |q̂ − q|, each process predicting every ``ranks.count``-th sample."""
+    mine = np.arange(ranks.rank, len(samples), ranks.count)
+    batches = [mine[at : at + batch_size] for at in range(0, len(mine), batch_size)]
+    error_sum = torch.zeros(1, dtype=torch.float64, device=device)
     model.eval()
-    error_sum = 0.0
     with torch.inference_mode():
-        for start in range(0, len(samples), batch_size):
-            indices = np.arange(start, min(start + batch_size, len(samples)))
-            inputs, quality = load_batch(samples, indices, device)
+        for inputs, quality in ready_batches(samples, batches, None, device, loader_workers=0):
             with mixed_precision(device):
-                predicted = model(inputs.contiguous(memory_format=torch.channels_last))
-            error_sum += (predicted - quality).abs().sum().item()
-    return error_sum / len(samples)
+                predicted = model(inputs)
+            error_sum += (predicted - quality).abs().sum()
+    return ranks.summed(error_sum).item() / len(samples)
 
 
-def _patience_ran_out(history: list[EpochMetrics], config: TrainConfig) -> bool:
+def _sums(
+    loss: Float[Tensor, ""], predicted: Float[Tensor, " b"], quality: Float[Tensor, " b"]
+) -> Float[Tensor, " 3"]:
+    """Loss, |q̂ − q| and samples of a process's part of a batch."""
+    error = (predicted.detach() - quality).abs().sum()
+    count = torch.tensor(float(len(quality)), device=error.device)
+    return torch.stack((loss.detach(), error, count)).double()
+
+
+def _no_sums(device: torch.device) -> Float[Tensor, " 3"]:
+    return torch.zeros(3, dtype=torch.float64, device=device)
+
+
+def _finished(history: list[EpochMetrics], config: TrainConfig) -> bool:
+    """All epochs are done, or patience ran out."""
     if not history:
         return False
     best = min(history, key=lambda metrics: metrics.val_mae)
-    return history[-1].epoch - best.epoch >= config.patience_epochs
+    waited = history[-1].epoch - best.epoch >= config.patience_epochs
+    return waited or len(history) >= config.epochs
 
 
 def _copied_weights(model: GaCnn) -> dict[str, Tensor]:
@@ -274,57 +334,3 @@ def _identity(
         "torch": torch.__version__,
     }
     return json.dumps(parts, sort_keys=True)
-
-
-def _save_state(
-    path: Path,
-    identity: str,
-    model: GaCnn,
-    optimizer: torch.optim.AdamW,
-    best_weights: dict[str, Tensor],
-    history: list[EpochMetrics],
-) -> None:
-    """Everything the next epoch needs; the schedule and the generators follow from its number."""
-    tensors = {f"model/{name}": tensor for name, tensor in model.state_dict().items()}
-    tensors |= {f"best/{name}": tensor for name, tensor in best_weights.items()}
-    for name, parameter in model.named_parameters():
-        for key, tensor in optimizer.state[parameter].items():
-            tensors[f"optimizer/{name}/{key}"] = tensor
-    metadata = {"identity": identity, "history": json.dumps([asdict(past) for past in history])}
-    publish_bytes(path, tensors_to_bytes(tensors, metadata))
-
-
-def _load_state(
-    path: Path,
-    identity: str,
-    model: GaCnn,
-    optimizer: torch.optim.AdamW,
-    best_weights: dict[str, Tensor],
-) -> tuple[list[EpochMetrics], dict[str, Tensor]]:
-    """Put a saved state in place; leave all as given where it is of other arguments.
-
-    Returns the history and the best weights.
-    """
-    tensors, metadata = tensors_from_bytes(path.read_bytes(), str(path))
-    if metadata.get("identity") != identity:
-        return [], best_weights
-    try:
-        history = [EpochMetrics(**past) for past in json.loads(metadata["history"])]
-        model.load_state_dict({name: tensors[f"model/{name}"] for name in model.state_dict()})
-        for name, parameter in model.named_parameters():
-            # In the parameter's own memory order, or the next step rounds differently.
-            optimizer.state[parameter] = {
-                key: torch.zeros_like(parameter).copy_(tensors[f"optimizer/{name}/{key}"])
-                for key in ("exp_avg", "exp_avg_sq")
-            }
-            step = tensors[f"optimizer/{name}/step"].to(parameter.device)
-            optimizer.state[parameter]["step"] = step
-        best = {
-            name: torch.zeros_like(given).copy_(tensors[f"best/{name}"])
-            for name, given in best_weights.items()
-        }
-    except (KeyError, TypeError, ValueError, RuntimeError) as error:
-        raise ArtifactError(
-            f"{path} cannot be continued: {error}", "Delete it to train from the start."
-        ) from error
-    return history, best

@@ -8,7 +8,7 @@ import rerun.blueprint as rrb
 
 from pipeline.artifacts.sample_messages import Samples
 from pipeline.artifacts.training_messages import TestFigures
-from pipeline.network.training import EpochMetrics
+from pipeline.network.resuming import EpochMetrics
 from pipeline.recording import colours
 from pipeline.recording.recording import looking, name_curve, step, time_panel
 

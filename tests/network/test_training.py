@@ -3,24 +3,21 @@
 import itertools
 import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from pipeline.config.learning import NetworkConfig, TrainConfig
 from pipeline.errors import ArtifactError
+from pipeline.network import training
 from pipeline.network.baselines import mean_predictor_mae
 from pipeline.network.checkpoint import save_checkpoint_bytes
 from pipeline.network.figures import mean_absolute_error
 from pipeline.network.inference import predict
+from pipeline.network.resuming import STATE_FILE, EpochMetrics, save_standing
 from pipeline.network.samples import GraspTensors
-from pipeline.network.training import (
-    STATE_FILE,
-    EpochMetrics,
-    TrainedNetwork,
-    learning_rate_at,
-    train,
-)
+from pipeline.network.training import TrainedNetwork, learning_rate_at, train
 from tests.network.planes import planes_with_holes
 
 NETWORK = NetworkConfig(layers=18, channels=(16, 16, 32, 32))
@@ -54,15 +51,15 @@ def short_training(
 def test_learns_planes_with_holes_far_better_than_the_mean(
     tmp_path: Path, held_out: GraspTensors
 ) -> None:
-    training = planes_with_holes(1500, seed=2)
+    learned = planes_with_holes(1500, seed=2)
     config = TrainConfig(epochs=8, batch_size=64, learning_rate=4e-3, threads=1, device="cpu")
     seen: list[int] = []
     trained = train(
-        config, NETWORK, 0, training, held_out, tmp_path, lambda metrics: seen.append(metrics.epoch)
+        config, NETWORK, 0, learned, held_out, tmp_path, lambda metrics: seen.append(metrics.epoch)
     )
     predicted = predict(trained.network, held_out.cloud, held_out.mask, 64, 1, False)
     mae = mean_absolute_error(predicted, held_out.quality)
-    assert mae < 0.4 * mean_predictor_mae(training.quality, held_out.quality)
+    assert mae < 0.4 * mean_predictor_mae(learned.quality, held_out.quality)
     assert mae == pytest.approx(trained.val_mae, abs=1e-6)
     assert seen == list(range(8))
     averaged = predict(trained.network, held_out.cloud, held_out.mask, 64, 1, True)
@@ -92,6 +89,37 @@ def test_killed_run_resumes_to_the_same_bytes(
     resumed = short_training(few, tmp_path / "killed", seed=1, kill_after=None)
     assert resumed.history == whole.history
     assert save_checkpoint_bytes(resumed.network) == save_checkpoint_bytes(whole.network)
+
+
+@pytest.mark.parametrize("kill_after", [1, 5])
+def test_run_killed_within_an_epoch_resumes_to_the_same_bytes(
+    tmp_path: Path, few: GraspTensors, kill_after: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = short_training(few, tmp_path / "whole", seed=1, kill_after=None)
+    saved = 0
+
+    def save_then_die(*arguments: Any) -> None:
+        nonlocal saved
+        save_standing(*arguments)
+        saved += 1
+        if saved == kill_after:
+            raise KilledError
+
+    # Four batches an epoch, each followed by a state: these kills fall inside one.
+    with monkeypatch.context() as patch:
+        patch.setattr(training, "save_standing", save_then_die)
+        with pytest.raises(KilledError):
+            train(SHORT, NETWORK, 1, few, few, tmp_path / "killed", print, save_every_s=0.0)
+    resumed = short_training(few, tmp_path / "killed", seed=1, kill_after=None)
+    assert resumed.history == whole.history
+    assert save_checkpoint_bytes(resumed.network) == save_checkpoint_bytes(whole.network)
+
+
+def test_every_sample_is_seen_once_an_epoch(tmp_path: Path, few: GraspTensors) -> None:
+    trained = short_training(few, tmp_path, seed=1, kill_after=None)
+    assert [metrics.samples for metrics in trained.history] == [len(few)] * 3
+    assert trained.waiting_share is not None
+    assert 0 < trained.waiting_share < 1
 
 
 def test_state_of_other_arguments_is_not_continued(tmp_path: Path, few: GraspTensors) -> None:

@@ -1,0 +1,105 @@
+"""Training samples decoded once: shards in sequence → memory-mapped arrays, keyed by content.
+
+An MCAP is read from its beginning to its end and never at random. So the shards of a split are
+decoded once into one plain ``.npy`` file a field, in a folder named by the shards' SHA-256; from
+then on any sample costs a copy of its bytes, and what is not used is not in memory. Other shards
+are another folder; folders of shards that are no more are removed.
+"""
+
+import hashlib
+import shutil
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+import numpy as np
+from filelock import FileLock
+
+from pipeline.artifacts.publishing import file_sha256
+from pipeline.artifacts.reading import open_artifact
+from pipeline.artifacts.sample_messages import STORED_AS, Samples, samples_of
+from pipeline.artifacts.sharding import listed_shards, read_index
+from pipeline.errors import ArtifactError
+from schemas.softgrip.v1.grasps_pb2 import ShardEntry
+from schemas.softgrip.v1.samples_pb2 import SampleBatch
+
+# Rises whenever the files of a cache change: one of another version is made again.
+CACHE_VERSION = 1
+_KEY_LENGTH = 24
+
+
+def cached_split(index: Path, split: str, cache: Path) -> Samples:
+    """All samples of a split, in shard order, mapped from the cache; decoded first where needed.
+
+    Several processes may ask at once: one decodes, the others wait.
+
+    index : the index of a sharded artifact. cache : folder for the decoded files.
+
+    Raises
+    ------
+    ArtifactError : a shard is missing, damaged, or not the one that the index names; or the split
+        is empty.
+    """
+    entries = [entry for entry in read_index(index).shards if entry.split == split]
+    folder = cache / f"{split}-{cache_key(entries)}"
+    cache.mkdir(parents=True, exist_ok=True)
+    with FileLock(cache / f"{split}.lock"):
+        if not folder.is_dir():
+            shards = dict(zip(listed_shards(index, [split]), entries, strict=True))
+            scratch = cache / f".{split}.part"
+            shutil.rmtree(scratch, ignore_errors=True)
+            scratch.mkdir()
+            decode_shards(shards, scratch)
+            for older in cache.glob(f"{split}-*"):
+                shutil.rmtree(older)
+            scratch.rename(folder)
+    return mapped_samples(folder)
+
+
+def cache_key(entries: Iterable[ShardEntry]) -> str:
+    """What the decoded files depend on: the content of every shard, in order."""
+    digest = hashlib.sha256(str(CACHE_VERSION).encode())
+    for entry in entries:
+        digest.update(f"{entry.sha256} {entry.samples}\n".encode())
+    return digest.hexdigest()[:_KEY_LENGTH]
+
+
+def decode_shards(shards: dict[Path, ShardEntry], into: Path) -> None:
+    """Read shards one after another, a message in memory at a time, into a file a field.
+
+    shards : file → what the index says of it.
+    """
+    count = sum(entry.samples for entry in shards.values())
+    arrays: dict[str, np.memmap] = {}
+    filled = 0
+    for part in _parts(shards):
+        for name, dtype in STORED_AS.items():
+            found = getattr(part, name)
+            if name not in arrays:
+                arrays[name] = np.lib.format.open_memmap(
+                    into / f"{name}.npy", "w+", dtype=dtype, shape=(count, *found.shape[1:])
+                )
+            arrays[name][filled : filled + len(part)] = found
+        filled += len(part)
+    if not filled:
+        raise ArtifactError("a split holds no samples", "Ask for more grasps or objects.")
+    for array in arrays.values():
+        array.flush()
+
+
+def mapped_samples(folder: Path) -> Samples:
+    """The samples of a folder of decoded fields, mapped; writing to them changes no file."""
+    arrays = {name: np.load(folder / f"{name}.npy", mmap_mode="c") for name in STORED_AS}
+    arrays["cloud_mask"] = arrays["cloud_mask"].view(bool)
+    return Samples(**arrays)
+
+
+def _parts(shards: dict[Path, ShardEntry]) -> Iterator[Samples]:
+    for path, entry in shards.items():
+        if file_sha256(path) != entry.sha256:
+            raise ArtifactError(
+                f"{path} is not the shard that its index names",
+                "Delete it and run 'make shards' again",
+            )
+        with open_artifact(path) as artifact:
+            for _, message in artifact.messages(SampleBatch):
+                yield samples_of(message)

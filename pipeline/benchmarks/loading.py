@@ -1,0 +1,80 @@
+"""Batches for training: what the loader gives a second, against raw memory maps and other formats.
+
+The loader's first pass decodes MCAP shards in sequence; every epoch then gathers shuffled batches
+from the decoded files. Peers are read as they read fastest, in sequence, and hold the same tensors,
+uncompressed all.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.artifacts.sample_cache import cached_split
+from pipeline.artifacts.sample_messages import STORED_AS, Samples
+from pipeline.artifacts.sharding import shard_entry, shard_path, write_index
+from pipeline.benchmarks.clock import seconds_of
+from pipeline.benchmarks.storage import BATCH, FORMATS, PROVENANCE, write_mcap
+from pipeline.network.loading import epoch_batches, load_batches
+from pipeline.network.samples import GraspTensors
+
+SHARDS = 4
+REPEATS = 5
+PEERS = ("hdf5", "zarr", "webdataset")
+
+
+def rates_mb_s(samples: Samples, folder: Path) -> dict[str, float]:
+    """MB/s of the loader's first pass and epochs, of a memory map and of the peers, in one call."""
+    index = write_shards(samples, folder)
+    cache = folder / "cache"
+    stored = sum(getattr(samples, name).astype(dtype).nbytes for name, dtype in STORED_AS.items())
+    first_pass = seconds_of(lambda: cached_split(index, "train", cache), 1)
+    mapped = cached_split(index, "train", cache)
+    given = GraspTensors(mapped.cloud, mapped.cloud_mask, mapped.quality)
+    batches = [
+        np.sort(batch) for batch in epoch_batches(len(given), BATCH, np.random.default_rng(0))
+    ]
+    learned = given.cloud.nbytes + given.mask.nbytes + given.quality.nbytes
+
+    def epoch() -> None:
+        for _ in load_batches(given, batches, workers=0, pinned=False):
+            pass
+
+    def memory_map() -> None:
+        maps = [np.load(path, mmap_mode="r") for path in decoded_files(cache)]
+        for indices in batches:
+            for array in maps:
+                array[indices]
+
+    seconds = {"epoch": seconds_of(epoch, REPEATS), "memory_map": seconds_of(memory_map, REPEATS)}
+    rates = {name: learned / 1e6 / taken for name, taken in seconds.items()}
+    rates["first_pass"] = stored / 1e6 / first_pass
+    parts = [samples.take(slice(at, at + BATCH)) for at in range(0, len(samples), BATCH)]
+    for name in PEERS:
+        write, read = FORMATS[name]
+        path = folder / name
+        write(path, parts)
+
+        def through(read=read, path=path) -> None:  # type: ignore[no-untyped-def]
+            for _ in read(path):
+                pass
+
+        rates[name] = stored / 1e6 / seconds_of(through, REPEATS)
+    return rates
+
+
+def write_shards(samples: Samples, folder: Path) -> Path:
+    """The samples as an index over a few shards, as the shards stage leaves them."""
+    index, entries = folder / "shards.mcap", []
+    for number, rows in enumerate(np.array_split(np.arange(len(samples)), SHARDS)):
+        path = shard_path(folder / "shards", number, SHARDS)
+        part = samples.take(slice(int(rows[0]), int(rows[-1]) + 1))
+        write_mcap(path, [part.take(slice(at, at + BATCH)) for at in range(0, len(part), BATCH)])
+        entries.append(shard_entry(path, folder, len(part), "train"))
+    write_index(index, PROVENANCE, entries, np.zeros(10))
+    return index
+
+
+def decoded_files(cache: Path) -> list[Path]:
+    """The decoded fields that training reads."""
+    (folder,) = cache.glob("train-*")
+    return [folder / f"{name}.npy" for name in ("cloud", "cloud_mask", "quality")]

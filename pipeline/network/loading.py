@@ -1,0 +1,115 @@
+"""Samples to batches: who sees which sample when, and how it is read.
+
+Samples lie decoded in memory-mapped arrays (``artifacts.sample_cache``), so a batch of any samples
+costs a copy of their bytes. An epoch is one permutation of *all* samples, across shards, that
+follows from (seed, epoch) alone; it is cut into batches, and each batch into as many parts as there
+are processes. Which process or loader worker reads a sample therefore changes nothing, a batch's
+number is all that a resumed epoch needs, and no sample is lost or doubled.
+"""
+
+import math
+import time
+from collections.abc import Iterable, Iterator
+from typing import TypeVar
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float, Int
+from torch import Tensor
+from torch.utils.data import DataLoader, Dataset
+
+from pipeline.errors import ConfigError
+from pipeline.network.samples import GraspTensors
+
+T = TypeVar("T")
+RawBatch = tuple[Int[Tensor, " b"], Float[Tensor, "b h w 3"], Bool[Tensor, "b h w"], Tensor]
+
+
+def batch_count(samples: int, batch_size: int) -> int:
+    """Batches of an epoch: as few as hold all samples at no more than ``batch_size`` each."""
+    return math.ceil(samples / batch_size)
+
+
+def epoch_batches(
+    samples: int, batch_size: int, rng: np.random.Generator
+) -> list[Int[np.ndarray, " b"]]:
+    """Indices of each batch of an epoch: a permutation cut into parts of nearly equal size."""
+    return np.array_split(rng.permutation(samples), batch_count(samples, batch_size))
+
+
+def part_of_rank(
+    batches: list[Int[np.ndarray, " b"]], rank: int, ranks: int
+) -> list[Int[np.ndarray, " part"]]:
+    """What one of ``ranks`` processes reads of each batch, in the order of the file.
+
+    Raises
+    ------
+    ConfigError : a batch has fewer samples than there are processes.
+    """
+    smallest = min(len(batch) for batch in batches)
+    if smallest < ranks:
+        raise ConfigError(
+            f"batches of {smallest} samples cannot be divided among {ranks} processes",
+            "Start fewer processes, or raise train.batch_size.",
+        )
+    return [np.sort(np.array_split(batch, ranks)[rank]) for batch in batches]
+
+
+class SampleBatches(Dataset[RawBatch]):
+    """Item k: indices, clouds, masks and qualities of the samples ``batches[k]``."""
+
+    def __init__(self, samples: GraspTensors, batches: list[Int[np.ndarray, " b"]]) -> None:
+        self._samples = samples
+        self._batches = batches
+
+    def __len__(self) -> int:
+        return len(self._batches)
+
+    def __getitem__(self, number: int) -> RawBatch:
+        indices = self._batches[number]
+        return (
+            torch.from_numpy(indices),
+            torch.from_numpy(np.asarray(self._samples.cloud[indices])),
+            torch.from_numpy(np.asarray(self._samples.mask[indices])),
+            torch.from_numpy(self._samples.quality[indices].astype(np.float32)),
+        )
+
+
+def load_batches(
+    samples: GraspTensors, batches: list[Int[np.ndarray, " b"]], workers: int, pinned: bool
+) -> DataLoader[RawBatch]:
+    """The batches in order, read by this process or ahead of it by ``workers`` others.
+
+    pinned : batches are put where a GPU copies from fastest.
+    """
+    return DataLoader(
+        SampleBatches(samples, batches),
+        batch_size=None,  # a batch is an item: it is gathered at once, not sample by sample
+        num_workers=workers,
+        pin_memory=pinned,
+        generator=torch.Generator(),  # the global one stays as it is
+    )
+
+
+class Waiting:
+    """Seconds that a loop waits for its items, and seconds that it works on them."""
+
+    def __init__(self) -> None:
+        self.waiting_s = 0.0
+        self.working_s = 0.0
+
+    def watch(self, items: Iterable[T]) -> Iterator[T]:
+        """Pass items through, booking the time before and after each."""
+        iterator = iter(items)
+        asked = time.perf_counter()
+        for item in iterator:
+            given = time.perf_counter()
+            self.waiting_s += given - asked
+            yield item
+            asked = time.perf_counter()
+            self.working_s += asked - given
+
+    def share(self) -> float | None:
+        """Waiting over all time; None before the first item."""
+        total = self.waiting_s + self.working_s
+        return self.waiting_s / total if total else None

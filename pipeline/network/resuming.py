@@ -1,0 +1,115 @@
+"""Where a training stands, kept on disk so that a killed one goes on as if it never stopped."""
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from pipeline.artifacts.publishing import publish_bytes
+from pipeline.errors import ArtifactError
+from pipeline.network.checkpoint import tensors_from_bytes, tensors_to_bytes
+from pipeline.network.ga_cnn import GaCnn
+
+STATE_FILE = "training.safetensors"
+
+
+@dataclass(frozen=True)
+class EpochMetrics:
+    """One epoch in figures.
+
+    Attributes
+    ----------
+    epoch : counted from 0.
+    learning_rate : at the epoch's last step.
+    train_loss : mean loss over the epoch's samples, as they were seen (augmented, in training).
+    train_mae : mean |q̂ − q| over the same.
+    val_mae : mean |q̂ − q| over the validation samples after the epoch.
+    samples : samples seen in the epoch, by all processes together.
+    """
+
+    epoch: int
+    learning_rate: float
+    train_loss: float
+    train_mae: float
+    val_mae: float
+    samples: int
+
+
+@dataclass
+class Standing:
+    """How far a training has come.
+
+    Attributes
+    ----------
+    history : the finished epochs.
+    best_weights : of the epoch with the lowest validation error; initial ones before any.
+    batch : batches done of the epoch that runs.
+    sums : loss, |q̂ − q| and samples, summed over those batches and all processes.
+    """
+
+    history: list[EpochMetrics]
+    best_weights: dict[str, Tensor]
+    batch: int
+    sums: Float[Tensor, " 3"]
+
+
+def save_standing(
+    path: Path, identity: str, model: GaCnn, optimizer: torch.optim.AdamW, standing: Standing
+) -> None:
+    """Everything the next batch needs; schedule and generators follow from its number.
+
+    identity : all that the training's result depends on, as text.
+    """
+    tensors = {f"model/{name}": tensor for name, tensor in model.state_dict().items()}
+    tensors |= {f"best/{name}": tensor for name, tensor in standing.best_weights.items()}
+    tensors["sums"] = standing.sums
+    for name, parameter in model.named_parameters():
+        for key, tensor in optimizer.state[parameter].items():
+            tensors[f"optimizer/{name}/{key}"] = tensor
+    metadata = {
+        "identity": identity,
+        "history": json.dumps([asdict(past) for past in standing.history]),
+        "batch": str(standing.batch),
+    }
+    publish_bytes(path, tensors_to_bytes(tensors, metadata))
+
+
+def load_standing(
+    path: Path, identity: str, model: GaCnn, optimizer: torch.optim.AdamW, fresh: Standing
+) -> Standing:
+    """Put a saved state in place and return it; ``fresh`` where it is of another training.
+
+    Raises
+    ------
+    ArtifactError : the state is damaged.
+    """
+    tensors, metadata = tensors_from_bytes(path.read_bytes(), str(path))
+    if metadata.get("identity") != identity:
+        return fresh
+    try:
+        standing = Standing(
+            history=[EpochMetrics(**past) for past in json.loads(metadata["history"])],
+            best_weights={
+                name: torch.zeros_like(given).copy_(tensors[f"best/{name}"])
+                for name, given in fresh.best_weights.items()
+            },
+            batch=int(metadata["batch"]),
+            sums=tensors["sums"].to(fresh.sums.device),
+        )
+        model.load_state_dict({name: tensors[f"model/{name}"] for name in model.state_dict()})
+        for name, parameter in model.named_parameters():
+            # In the parameter's own memory order, or the next step rounds differently.
+            optimizer.state[parameter] = {
+                key: torch.zeros_like(parameter).copy_(tensors[f"optimizer/{name}/{key}"])
+                for key in ("exp_avg", "exp_avg_sq")
+            }
+            step = tensors[f"optimizer/{name}/step"].to(parameter.device)
+            optimizer.state[parameter]["step"] = step
+    except (KeyError, TypeError, ValueError, RuntimeError) as error:
+        raise ArtifactError(
+            f"{path} cannot be continued: {error}", "Delete it to train from the start."
+        ) from error
+    return standing

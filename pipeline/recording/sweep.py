@@ -1,0 +1,105 @@
+"""sweep.rrd: error and time against depth, a curve a channel set, and what each part buys."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import rerun as rr
+import rerun.blueprint as rrb
+
+from pipeline.network.family import VARIANTS
+from pipeline.recording import colours
+from pipeline.recording.recording import name_curve, step, time_panel
+from schemas.softgrip.v1.training_pb2 import SweepBudget, SweepNetwork
+
+TIMELINE = "layers"
+_CHOSEN_COLOUR = (60, 200, 90)
+
+
+def blueprint() -> rrb.Blueprint:
+    """Fig. 1 as two plots over depth, the tables beside."""
+    return rrb.Blueprint(
+        rrb.Horizontal(
+            rrb.Vertical(
+                rrb.TimeSeriesView(
+                    origin="/curves/error", name="mean |q-hat - q| on test objects, by layers"
+                ),
+                rrb.TimeSeriesView(
+                    origin="/curves/time", name="ms a grasp (batch 64, CPU), by layers"
+                ),
+            ),
+            rrb.TextDocumentView(origin="/notes/sweep", name="Networks on one budget"),
+            column_shares=[3, 2],
+        ),
+        time_panel(TIMELINE),
+        collapse_panels=True,
+    )
+
+
+def show_sweep(
+    stream: rr.RecordingStream,
+    networks: Sequence[SweepNetwork],
+    times_ms: Sequence[float],
+    budget: SweepBudget,
+) -> None:
+    """Log a curve a channel set, the chosen network as a dot, and the tables."""
+    family = [
+        (network, time_ms)
+        for network, time_ms in zip(networks, times_ms, strict=True)
+        if network.group == "family"
+    ]
+    for number, channels in enumerate(dict.fromkeys(channels_name(n) for n, _ in family)):
+        colour = colours.PALETTE[number % len(colours.PALETTE)]
+        for curve in ("error", "time"):
+            name_curve(stream, f"curves/{curve}/{channels}", channels, colour)
+    dot = rr.SeriesPoints(names="chosen", colors=_CHOSEN_COLOUR, markers="circle", marker_sizes=6)
+    for curve in ("error", "time"):
+        stream.log(f"curves/{curve}/chosen", dot, static=True)
+    for network, time_ms in family:
+        step(stream, TIMELINE, network.layers)
+        for curve, value in (("error", network.test_mae), ("time", time_ms)):
+            stream.log(f"curves/{curve}/{channels_name(network)}", rr.Scalars(value))
+            if network.chosen:
+                stream.log(f"curves/{curve}/chosen", rr.Scalars(value))
+    text = f"{budget_words(budget)}\n\n{family_table(family)}\n\n{ablation_table(networks)}\n"
+    document = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
+    stream.log("notes/sweep", document, static=True)
+
+
+def channels_name(network: SweepNetwork) -> str:
+    """Such as ``64-128-256-512``."""
+    return "-".join(map(str, network.channels))
+
+
+def budget_words(budget: SweepBudget) -> str:
+    """What every network was given, in a sentence."""
+    return (
+        f"{budget.train_samples} training samples, {budget.epochs} epochs, batches of "
+        f"{budget.batch_size}; {budget.test_samples} test samples, of which the mean predictor "
+        f"errs by {budget.mean_predictor_mae:.4f}."
+    )
+
+
+def family_table(family: Sequence[tuple[SweepNetwork, float]]) -> str:
+    """One row a network; the chosen one in bold."""
+    rows = []
+    for network, time_ms in family:
+        bold = "**" if network.chosen else ""
+        error = f"{bold}{network.test_mae:.4f}{bold}"
+        size = f"{network.parameters / 1e6:.2f}"
+        rows.append(
+            f"| {channels_name(network)} | {network.layers} | {error} | {time_ms:.3f} | {size} |"
+        )
+    return "\n".join(["| channels | layers | error | ms | M parameters |", "|-|-|-|-|-|", *rows])
+
+
+def ablation_table(networks: Sequence[SweepNetwork]) -> str:
+    """Mean error over the seeds, of one prediction and of the mean over symmetries."""
+    rows = []
+    for variant in VARIANTS:
+        mine = [n for n in networks if n.group == "ablation" and n.variant == variant]
+        if mine:
+            single = np.mean([n.test_mae_single for n in mine])
+            averaged = np.mean([n.test_mae_averaged for n in mine])
+            rows.append(f"| {variant} | {len(mine)} | {single:.4f} | {averaged:.4f} |")
+    head = ["| run's network | seeds | one prediction | mean over symmetries |", "|-|-|-|-|"]
+    return "\n".join([*head, *rows]) if rows else ""

@@ -1,0 +1,101 @@
+"""Shards are decoded once, in order, for as long as their content is the same."""
+
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.artifacts import ArtifactWriter, Provenance
+from pipeline.artifacts.sample_cache import cached_split
+from pipeline.artifacts.sample_messages import Samples, joined_samples, sample_batch
+from pipeline.artifacts.sharding import shard_entry, shard_path, write_index
+from pipeline.errors import ArtifactError
+
+
+def some_samples(count: int, seed: int) -> Samples:
+    rng = np.random.default_rng(seed)
+    return Samples(
+        cloud=rng.normal(size=(count, 24, 24, 3)).astype(np.float16),
+        cloud_mask=rng.random((count, 24, 24)) < 0.5,
+        quality=rng.random(count).astype(np.float32),
+        object_index=rng.integers(0, 5, count),
+        shape_class=rng.integers(0, 3, count),
+        level=rng.integers(1, 10, count),
+        pressure=rng.random(count).astype(np.float32),
+    )
+
+
+def sharded(folder: Path, provenance: Provenance, parts: list[Samples]) -> Path:
+    """An index over one shard a part, two messages each, and over a shard of another split."""
+    index, entries = folder / "shards.mcap", []
+    for number, part in enumerate([*parts, some_samples(3, seed=99)]):
+        path = shard_path(folder / "shards", number, len(parts) + 1)
+        half = len(part) // 2
+        with ArtifactWriter(path, provenance) as artifact:
+            for start, stop in ((0, half), (half, len(part))):
+                batch = sample_batch(part.take(slice(start, stop)), ("a",))
+                artifact.write("/samples", batch, log_time_ns=start)
+        split = "train" if number < len(parts) else "test"
+        entries.append(shard_entry(path, folder, len(part), split))
+    write_index(index, provenance, entries, np.zeros(10))
+    return index
+
+
+PARTS = [some_samples(7, seed=0), some_samples(5, seed=1)]
+
+
+def test_mapped_samples_are_those_of_the_shards_in_order(
+    tmp_path: Path, provenance: Provenance
+) -> None:
+    index = sharded(tmp_path, provenance, PARTS)
+    mapped = cached_split(index, "train", tmp_path / "cache")
+    whole = joined_samples(PARTS)
+    for field in fields(Samples):
+        found = getattr(mapped, field.name)
+        assert isinstance(found, np.memmap)
+        np.testing.assert_array_equal(found, getattr(whole, field.name))
+    assert mapped.cloud_mask.dtype == np.bool_
+    assert len(cached_split(index, "test", tmp_path / "cache")) == 3
+
+
+def test_equal_content_is_decoded_once_and_other_content_anew(
+    tmp_path: Path, provenance: Provenance
+) -> None:
+    cache = tmp_path / "cache"
+    cached_split(sharded(tmp_path / "a", provenance, PARTS), "train", cache)
+    (made,) = cache.glob("train-*")
+    before = (made / "cloud.npy").stat().st_mtime_ns
+    cached_split(sharded(tmp_path / "b", provenance, PARTS), "train", cache)
+    assert (made / "cloud.npy").stat().st_mtime_ns == before
+    other = cached_split(sharded(tmp_path / "c", provenance, PARTS[::-1]), "train", cache)
+    (now,) = cache.glob("train-*")
+    assert now != made
+    np.testing.assert_array_equal(other.quality[:5], PARTS[1].quality)
+
+
+def test_a_kill_while_decoding_leaves_nothing_that_passes_for_whole(
+    tmp_path: Path, provenance: Provenance
+) -> None:
+    index, cache = sharded(tmp_path, provenance, PARTS), tmp_path / "cache"
+    (cache / ".train.part").mkdir(parents=True)
+    (cache / ".train.part" / "cloud.npy").write_bytes(b"half")
+    mapped = cached_split(index, "train", cache)
+    np.testing.assert_array_equal(mapped.cloud, joined_samples(PARTS).cloud)
+    assert not (cache / ".train.part").exists()
+
+
+def test_a_shard_that_is_not_the_indexs_is_named(tmp_path: Path, provenance: Provenance) -> None:
+    index = sharded(tmp_path, provenance, PARTS)
+    shard_path(tmp_path / "shards", 0, 3).write_bytes(
+        shard_path(tmp_path / "shards", 1, 3).read_bytes()
+    )
+    with pytest.raises(ArtifactError, match=r"00000-of-00003\.mcap is not the shard"):
+        cached_split(index, "train", tmp_path / "cache")
+    assert not list((tmp_path / "cache").glob("train-*"))
+
+
+def test_a_split_without_samples_is_refused(tmp_path: Path, provenance: Provenance) -> None:
+    index = sharded(tmp_path, provenance, PARTS)
+    with pytest.raises(ArtifactError, match="no samples"):
+        cached_split(index, "val", tmp_path / "cache")

@@ -1,0 +1,69 @@
+"""The family to compare, its cost in closed form, and which member is taken."""
+
+import numpy as np
+import pytest
+
+from pipeline.config.learning import NetworkConfig, SweepConfig
+from pipeline.errors import ConfigError
+from pipeline.network.family import (
+    VARIANTS,
+    chosen_member,
+    members,
+    multiply_adds,
+    standard_error,
+)
+from pipeline.network.ga_cnn import build_network
+
+OF_RUN = NetworkConfig(layers=52, channels=(64, 128, 256, 512))
+
+
+def test_the_published_comparison_has_over_50_networks_of_18_to_102_layers() -> None:
+    family = members(SweepConfig(ablation_seeds=0), OF_RUN, seed=0)
+    assert len(family) > 50
+    assert len({m.name for m in family}) == len(family)
+    depths = {m.network.layers for m in family}
+    assert min(depths) == 18
+    assert max(depths) == 102
+    assert len({m.network.channels for m in family}) == 4
+    assert OF_RUN in [m.network for m in family]
+
+
+def test_ablation_leaves_out_one_part_at_a_time() -> None:
+    config = SweepConfig(depths=(18,), channels=((8, 8, 8, 8),), ablation_seeds=2)
+    ablation = [m for m in members(config, OF_RUN, seed=5) if m.group == "ablation"]
+    assert [m.variant for m in ablation] == [*VARIANTS, *VARIANTS]
+    assert [m.seed for m in ablation] == [5, 5, 5, 6, 6, 6]
+    whole, no_attention, no_augmentation = ablation[:3]
+    assert whole.network == no_augmentation.network == OF_RUN
+    assert no_attention.network == OF_RUN.model_copy(update={"attention": "none"})
+    assert [m.augment for m in ablation[:3]] == [True, True, False]
+
+
+def test_a_depth_that_no_member_has_is_refused_before_any_training() -> None:
+    with pytest.raises(ConfigError, match="19"):
+        members(SweepConfig(depths=(18, 19)), OF_RUN, seed=0)
+
+
+def test_multiply_adds_are_those_of_the_layers_sizes() -> None:
+    c = 16
+    network = build_network(NetworkConfig(layers=18, channels=(c, c, c, c), attention="none"), 0)
+    stem = 24 * 24 * 6 * (c // 2) * 9 + 12 * 12 * (c // 2) * c * 9
+    # Blocks of 9 c and c weights a channel and cell; strides halve the map in the second and third
+    # stage, whose shortcuts then project. 18 layers are 1, 2, 2, 2 blocks.
+    block = (9 * c * c) + c * c
+    cells = [144] + [36] * 2 + [9] * 2 + [9] * 2
+    blocks = sum(block * n for n in cells) + c * c * (36 + 9)
+    head = c * (c // 4) + c // 4
+    assert multiply_adds(network) == stem + blocks + head
+
+
+def test_the_cheapest_within_one_standard_error_is_chosen() -> None:
+    errors, spread = [0.10, 0.051, 0.050, 0.052], [0.01, 0.002, 0.0015, 0.002]
+    assert chosen_member(errors, spread, cost=[1, 5, 9, 7]) == 1
+    assert chosen_member(errors, [0.0] * 4, cost=[1, 5, 9, 7]) == 2
+    assert chosen_member(errors, [0.1] * 4, cost=[1, 5, 9, 7]) == 0
+
+
+def test_standard_error_shrinks_with_the_root_of_the_count() -> None:
+    errors = np.random.default_rng(0).random(400).astype(np.float32)
+    assert standard_error(errors) == pytest.approx(errors.std() / 20, rel=1e-5)

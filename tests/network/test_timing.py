@@ -1,0 +1,27 @@
+"""Times a grasp are medians of calls over the batch's size."""
+
+import time
+
+import numpy as np
+import pytest
+
+from pipeline.network.timing import milliseconds_a_grasp
+from tests.network.planes import planes_with_holes
+
+FEW = planes_with_holes(5, seed=0)
+
+
+def test_each_batch_size_is_timed_at_its_size() -> None:
+    sizes: list[int] = []
+
+    def predict(cloud: np.ndarray, mask: np.ndarray, size: int) -> np.ndarray:
+        assert len(cloud) == len(mask) == size
+        sizes.append(size)
+        time.sleep(0.004)
+        return np.zeros(size)
+
+    figures = milliseconds_a_grasp(predict, FEW.cloud, FEW.mask, (1, 8), seconds=0.0)
+    assert sizes == [1] * 4 + [8] * 4
+    assert set(figures) == {"1", "8"}
+    assert figures["1"] >= 4.0
+    assert figures["8"] == pytest.approx(figures["1"] / 8, rel=1.0)
