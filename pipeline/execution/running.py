@@ -31,6 +31,7 @@ InputsOf = Callable[[Stage, RunFolder, Path | None], dict[str, Path]]
 
 EXIT_FAILURE = 1
 EXIT_INTERRUPTED = 130
+MEMO = "hashes.json"
 
 
 def stage_command(stage: Stage, build: Build, inputs_of: InputsOf, rank: int = 0) -> None:
@@ -57,7 +58,9 @@ def stage_command(stage: Stage, build: Build, inputs_of: InputsOf, rank: int = 0
     ) -> None:
         folder = RunFolder(runs_dir / run)
         with _readable_failures(stage, folder, rank):
-            context = stage_context(stage, folder, inputs_of, mesh_dir, workers)
+            # Of its own for each process: two would write one memo at once.
+            memo = f"hashes.rank{rank}.json" if rank else MEMO
+            context = stage_context(stage, folder, inputs_of, mesh_dir, workers, memo)
             context = replace(context, executor=executor)
             if rank > 0:
                 if force or not is_fresh(context):
@@ -73,9 +76,16 @@ def stage_command(stage: Stage, build: Build, inputs_of: InputsOf, rank: int = 0
 
 
 def stage_context(
-    stage: Stage, folder: RunFolder, inputs_of: InputsOf, mesh_dir: Path | None, workers: int
+    stage: Stage,
+    folder: RunFolder,
+    inputs_of: InputsOf,
+    mesh_dir: Path | None,
+    workers: int,
+    memo: str = MEMO,
 ) -> StageContext:
     """Configuration, inputs and key of a stage as things are now.
+
+    memo : file of the run's state in which hashes of unchanged inputs are kept.
 
     Raises
     ------
@@ -92,7 +102,7 @@ def stage_context(
                 f"{path} is missing, and {stage.name} reads it",
                 f"Make {name} first: 'make {stage.name} RUN={folder.path.name}' does both",
             )
-    key = stage_key(config, stage.sections, stage.module, inputs, folder.state("hashes.json"))
+    key = stage_key(config, stage.sections, stage.module, inputs, folder.state(memo))
     return StageContext(stage, config, folder, key, inputs, workers, mesh_dir)
 
 
