@@ -29,7 +29,7 @@ ifeq (,$(strip $(WORKERS)))
 unexport WORKERS
 endif
 
-.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery review lint clean FORCE
+.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery review report export lint clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -108,6 +108,12 @@ gallery: .venv/.ready  ## the nine levels on one sheet, to runs/<run>/gallery.pn
 
 review: .venv/.ready  ## recordings of RUN (of STAGE alone) in the Rerun viewer
 	@STAGE=$(STAGE) $(PY) -m stages.review
+
+report: .venv/.ready  ## the run on one page, to runs/<run>/report.html and report.md
+	@$(PY) -m stages.report
+
+export: .venv/.ready  ## dataset as FORMAT=acronym|graspgen|webdataset|parquet, to runs/<run>/export
+	@FORMAT=$(or $(FORMAT),acronym) $(PY) -m stages.export
 
 lint: .venv/.ready
 	$(PY) -m ruff check .

@@ -61,7 +61,7 @@ from schemas.softgrip.v1.grasps_pb2 import GraspBatch
 from stages.graph import GRASPS, inputs_of
 
 TOPIC = "/grasps"
-RECORDED_SCENES = 12
+RECORDED_SCENES = 6  # each costs its ray scene once more
 ROUND = 512  # grasps labelled at once: bounds the memory of their rays
 
 
@@ -343,14 +343,16 @@ def shown_grasps(
         batches = [grasps_of(message) for _, message in artifact.messages(GraspBatch)]
     rows = [(origin, batch, row) for origin, batch in batches for row in range(len(batch))]
     rows.sort(key=lambda found: found[1].quality[found[2]])
+    chosen = [rows[i] for i in spread(len(rows), wanted)]
     rays, _ = ray_scene(scene, meshes, config)
-    pad = pad_of(config)
-    shown = []
-    for origin, grasps, row in (rows[i] for i in spread(len(rows), wanted)):
-        frame = grasps.world_from_gripper[row : row + 1]
-        heights, _ = pad_heights(frame, rays, pad, config.grasps.clearance_m)
-        shown.append(ShownGrasp(scene, origin, grasps, row, drape(pad, heights)[0]))
-    return shown
+    frames = np.array([grasps.world_from_gripper[row] for _, grasps, row in chosen])
+    heights, _ = pad_heights(frames, rays, pad_of(config), config.grasps.clearance_m)
+    return [
+        ShownGrasp(scene, origin, grasps, row, draped)
+        for (origin, grasps, row), draped in zip(
+            chosen, drape(pad_of(config), heights), strict=True
+        )
+    ]
 
 
 def summary(results: list[ShardResult], quality: np.ndarray) -> Summary:

@@ -26,9 +26,10 @@ from pipeline.geometry.catalogue import (
     finish_object,
     measure_object,
 )
-from pipeline.geometry.mesh_files import load_mesh_file, object_names
+from pipeline.geometry.mesh_files import object_names
 from pipeline.geometry.parametric import PARAMETRIC_OBJECTS, parametric_source
 from pipeline.geometry.selection import choose_split, choose_subset
+from pipeline.geometry.urdf_files import load_object_file, standalone
 from pipeline.recording.objects import blueprint, show_catalogue
 from pipeline.recording.recording import recording, spread
 from schemas.softgrip.v1.objects_pb2 import RefusedMesh
@@ -73,8 +74,8 @@ def measure(stage: StageContext) -> tuple[list[MeasuredObject], list[RefusedMesh
     folder = stage.mesh_dir
     jobs: list[tuple[Path | None, str]] = [(None, name) for name in sorted(PARAMETRIC_OBJECTS)]
     if folder is not None:
-        names = object_names(paths, folder)
-        jobs = [(path, names[path]) for path in paths]
+        names = object_names(standalone(paths, folder), folder)
+        jobs = [(path, name) for path, name in names.items()]
     job = partial(measured_or_refused, config=stage.config.objects, folder=folder)
     results = run_in_order(job, jobs, stage.workers, stage.executor)
     measured, refused = [], []
@@ -95,7 +96,7 @@ def measured_or_refused(
     try:
         if path is None or folder is None:
             return measure_object(parametric_source(name), config)
-        return measure_object(load_mesh_file(path, folder, name, config), config)
+        return measure_object(load_object_file(path, folder, name, config), config)
     except MeshError as error:
         return RefusedMesh(source=name, reason=error.what, remedy=error.remedy)
 
@@ -115,7 +116,7 @@ def publish(
 ) -> None:
     """Write the recording, then the artifact: what is there last makes the stage whole."""
     shown = [objects[i] for i in spread(len(objects), stage.config.recording.objects)]
-    opening = blueprint(len(shown))
+    opening = blueprint(len(shown), max(item.nsvr for item in shown))
     with recording(stage.recording, stage.stage.name, stage.key.digest, opening) as stream:
         show_catalogue(stream, [(item, split[item.name]) for item in shown])
     with ArtifactWriter(stage.output, stage.provenance()) as artifact:

@@ -37,6 +37,9 @@ class ObjectsConfig(Section):
     max_hole_fraction: float = Field(
         0.02, ge=0, le=1, description="largest area share of the surface that repair may invent [1]"
     )
+    rescaled: bool = Field(
+        True, description="false keeps every object's own size, as with a URDF's scale"
+    )
     target_extent_min_m: float = Field(
         0.06, gt=0, description="smallest longest-extent after rescaling [m]; Supplement III"
     )

@@ -16,6 +16,7 @@ from typing import Any
 from pydantic import Field, ValidationError
 
 from pipeline.config.cameras import CamerasConfig
+from pipeline.config.dataset import DatasetConfig
 from pipeline.config.evaluation import EvaluateConfig, RecordingConfig
 from pipeline.config.grasps import GraspsConfig, GripperConfig, SensingConfig
 from pipeline.config.learning import NetworkConfig, ShardsConfig, SweepConfig, TrainConfig
@@ -42,6 +43,7 @@ class RunConfig(Section):
     sweep: SweepConfig = SweepConfig()
     evaluate: EvaluateConfig = EvaluateConfig()
     recording: RecordingConfig = RecordingConfig()
+    dataset: DatasetConfig = DatasetConfig()
 
 
 def load_run_config(path: Path) -> RunConfig:

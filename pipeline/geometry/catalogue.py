@@ -84,7 +84,9 @@ def finish_object(
     rng: draws the target extent alone. cache_dir: where convex parts are kept. NSVR is the
     measured one: rescaling does not change it.
     """
-    target = draw_target_extent(config, rng)
+    target = float(measured.mesh.extents_m.max())
+    if config.rescaled:
+        target = draw_target_extent(config, rng)
     scaled, scale = rescale(measured.mesh, target)
     centre = mass_properties(scaled, config.density_kg_m3).centre_of_mass_m
     mesh = Mesh(scaled.vertices_m - centre, scaled.faces)

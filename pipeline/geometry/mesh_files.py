@@ -17,6 +17,7 @@ from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.mesh_headers import check_header, check_off_faces
 
 MESH_SUFFIXES = (".glb", ".obj", ".off", ".ply", ".stl")
+SOURCE_SUFFIXES = (*MESH_SUFFIXES, ".urdf")  # a URDF places meshes of the folder at a scale
 UnitSource = Literal["declared", "configured", "detected"]
 
 _METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
@@ -60,7 +61,7 @@ class MeshSource:
 
 
 def list_mesh_files(folder: Path) -> list[Path]:
-    """Mesh files of a folder and its subfolders, sorted by relative path.
+    """Mesh and URDF files of a folder and its subfolders, sorted by relative path.
 
     Known suffixes only, hidden files and folders left out. Links are listed where they lead to a
     file inside the folder and left out where they lead outside; linked folders are not entered.
@@ -72,14 +73,14 @@ def list_mesh_files(folder: Path) -> list[Path]:
     found = [
         path
         for path in folder.rglob("*")
-        if path.suffix.lower() in MESH_SUFFIXES
+        if path.suffix.lower() in SOURCE_SUFFIXES
         and not any(part.startswith(".") for part in path.relative_to(folder).parts)
         and path.is_file()
         and path.resolve().is_relative_to(root)
     ]
     if not found:
         raise MeshError(
-            f"{folder} holds no mesh file", f"Put files of {', '.join(MESH_SUFFIXES)} there"
+            f"{folder} holds no mesh file", f"Put files of {', '.join(SOURCE_SUFFIXES)} there"
         )
     return sorted(found, key=lambda path: path.relative_to(folder).as_posix())
 
@@ -105,6 +106,17 @@ def load_mesh_file(path: Path, folder: Path, name: str, config: ObjectsConfig) -
     out of range, or a size that no unit explains.
     """
     label = path.relative_to(folder).as_posix()
+    raw, declared, data = read_raw_mesh(path, folder, config)
+    unit, known_by = length_unit(label, float(raw.extents_m.max()), declared, config)
+    mesh = Mesh(raw.vertices_m * _METRES_PER_UNIT[unit], raw.faces)
+    return MeshSource(name, label, hashlib.sha256(data).hexdigest(), mesh, unit, known_by)
+
+
+def read_raw_mesh(
+    path: Path, folder: Path, config: ObjectsConfig
+) -> tuple[Mesh, str | None, bytes]:
+    """A file's checked surface in its own unit, the unit it declares, if any, and its bytes."""
+    label = path.relative_to(folder).as_posix()
     if not path.resolve().is_relative_to(folder.resolve()):
         raise MeshError(f"{label} leads out of its folder", "Copy the mesh into the folder")
     mebibytes = path.stat().st_size / 2**20
@@ -119,9 +131,7 @@ def load_mesh_file(path: Path, folder: Path, name: str, config: ObjectsConfig) -
     if path.suffix.lower() == ".off":
         check_off_faces(label, data, len(raw.faces))
     check_arrays(label, raw, config.max_faces)
-    unit, known_by = length_unit(label, float(raw.extents_m.max()), declared, config)
-    mesh = Mesh(raw.vertices_m * _METRES_PER_UNIT[unit], raw.faces)
-    return MeshSource(name, label, hashlib.sha256(data).hexdigest(), mesh, unit, known_by)
+    return raw, declared, data
 
 
 def parse_mesh(label: str, data: bytes) -> tuple[Mesh, str | None]:

@@ -20,13 +20,13 @@ from pipeline.gripper.balancing import quality_histogram
 from pipeline.gripper.pad import Pad
 from pipeline.recording import colours
 from pipeline.recording.recording import looking, name_curve, numbered, step, time_panel
-from pipeline.recording.shapes import shown_mesh
+from pipeline.recording.shapes import shown_mesh, shown_pose
 
 TIMELINE = "grasp"
-CONTACT = colours.PALETTE[2]
 LIFTED = colours.PALETTE[5]
 LIFT_M = 3e-4  # the pad is drawn this much above what it lies on
 ARROW_M = 0.04  # a full seal's force is drawn this long
+LOADS = ("F_x", "F_y", "F_z", "T_z")
 NEAR_M = 0.12  # other objects are drawn when this near
 
 
@@ -47,12 +47,14 @@ def blueprint() -> rrb.Blueprint:
         rrb.Horizontal(
             rrb.Spatial3DView(
                 origin="/world",
-                name="Pad (green: in contact), cloud and wrench, in GCS",
+                name="Pad by pressure (dark 0, yellow 1; red: lifted), wrench, cloud; in GCS",
                 eye_controls=looking((-0.09, -0.13, 0.11), (0.0, 0.0, -0.01)),
             ),
             rrb.Vertical(
                 rrb.TextDocumentView(origin="/notes/grasp", name="Grasp"),
-                rrb.BarChartView(origin="/curves/limits", name="Share of each limit, Eq. (8)-(11)"),
+                rrb.BarChartView(
+                    origin="/curves/limits", name="Share used of the limits of F_x, F_y, F_z, T_z"
+                ),
                 rrb.TimeSeriesView(origin="/curves/label", name="q and p, best to worst"),
                 rrb.BarChartView(origin="/curves/quality", name="All labels, q in tenths"),
                 row_shares=[3, 2, 2, 2],
@@ -95,21 +97,28 @@ def _show_surroundings(
     """The target and its near neighbours, in GCS."""
     gripper_from_world = invert(grasps.world_from_gripper[row])
     for placed in scene.objects:
-        mesh = meshes[placed.object_name].transformed(gripper_from_world @ placed.world_from_object)
+        mesh = meshes[placed.object_name]
+        gripper_from_object = gripper_from_world @ placed.world_from_object
         target = placed.body_id == grasps.body_id[row]
-        if not target and np.linalg.norm(mesh.vertices_m, axis=1).min() > NEAR_M:
+        # The frame's origin is the pad's centre.
+        pad_centre = invert(gripper_from_object)[:3, 3]
+        if not target and np.linalg.norm(mesh.vertices_m - pad_centre, axis=1).min() > NEAR_M:
             continue
         colour = colours.PALETTE[1] if target else colours.PALETTE[7]
-        stream.log(f"{path}/{placed.body_id:02d}", shown_mesh(mesh, colour))
+        body = f"{path}/{placed.body_id:02d}"
+        # Mesh and pose apart: the mesh is simplified once, however often it is shown.
+        stream.log(body, shown_mesh(mesh, colour))
+        stream.log(body, shown_pose(gripper_from_object))
 
 
 def _show_pad(stream: rr.RecordingStream, shown: ShownGrasp, pad: Pad) -> None:
-    """The draped pad, coloured where it touches; the cloud; the wrench."""
+    """The draped pad, where it touches in the colour of its pressure; the cloud; the wrench."""
     grasps, row = shown.grasps, shown.row
     contact = grasps.contact_mask[row]
     vertices = np.column_stack([pad.vertices_xy_m, shown.pad_height_m + LIFT_M])
     sealing = contact[pad.triangles].all(axis=1)
-    per_vertex = np.where(contact[:, None], CONTACT, LIFTED).astype(np.uint8)
+    pressure = colours.by_value(grasps.pressure[row : row + 1])
+    per_vertex = np.where(contact[:, None], pressure, LIFTED).astype(np.uint8)
     stream.log(
         "world/pad",
         rr.Mesh3D(
@@ -148,7 +157,10 @@ def _show_figures(
     width = np.maximum(upper + lower, 1e-12)
     used = 1.0 - 2.0 * np.minimum(upper, lower) / width
     stream.log("curves/limits", rr.BarChart(used))
-    wrench = ", ".join(f"{value:+.3f}" for value in grasps.wrench[row])
+    loads = "".join(
+        f"| {name} of GW, share of its limit | {value:+.3f}, {100 * share:.0f} % |\n"
+        for name, value, share in zip(LOADS, grasps.wrench[row], used, strict=True)
+    )
     stream.log(
         "notes/grasp",
         rr.TextDocument(
@@ -158,7 +170,7 @@ def _show_figures(
             f"| | |\n|-|-|\n"
             f"| object | {origin.object_names[int(grasps.object_index[row])]} |\n"
             f"| scene | {origin.scene_id}, level {origin.level}, {origin.split} |\n"
-            f"| GW = F_x, F_y, F_z, T_z | {wrench} |\n"
+            f"{loads}"
             f"| tilt off the normal | {np.degrees(float(grasps.tilt_rad[row])):.1f}° |\n"
             f"| proposed as | {origin.proposal_names[int(grasps.proposal[row])]} |\n",
             media_type=rr.MediaType.MARKDOWN,

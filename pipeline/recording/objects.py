@@ -18,7 +18,7 @@ TIMELINE = "object"
 SPACING_M = 0.22
 
 
-def blueprint(objects: int) -> rrb.Blueprint:
+def blueprint(objects: int, greatest_nsvr: float) -> rrb.Blueprint:
     """Opens on the whole catalogue; stepping through shows one object after the other."""
     middle = SPACING_M * (_columns(objects) - 1) / 2
     return rrb.Blueprint(
@@ -27,12 +27,21 @@ def blueprint(objects: int) -> rrb.Blueprint:
                 origin="/world/catalogue",
                 name="Catalogue, coloured by class, NSVR growing",
                 eye_controls=looking(
-                    (middle, -3.6 * middle - 0.2, 2.2 * middle + 0.2), (middle, -middle, 0.0)
+                    (middle, -2.7 * middle - 0.15, 1.5 * middle + 0.15), (middle, -middle, 0.0)
                 ),
             ),
             rrb.Vertical(
-                rrb.Spatial3DView(origin="/world/object", name="Object and its convex parts"),
-                rrb.TimeSeriesView(origin="/curves/nsvr", name="NSVR and its two thresholds"),
+                rrb.Spatial3DView(
+                    origin="/world/object",
+                    name="Object (left) and its convex parts",
+                    eye_controls=looking((0.08, -0.2, 0.12), (0.08, 0.0, 0.0)),
+                ),
+                rrb.TimeSeriesView(
+                    origin="/curves/nsvr",
+                    name="NSVR by object, and the two thresholds of its classes",
+                    axis_y=rrb.ScalarAxis(range=(2.0, greatest_nsvr + 0.2)),
+                    plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftTop),
+                ),
                 rrb.TextDocumentView(origin="/notes/object", name="Facts"),
                 row_shares=[4, 3, 3],
             ),
@@ -57,11 +66,12 @@ def show_catalogue(
         for index in range(len(items)):
             step(stream, TIMELINE, index)
             stream.log(f"curves/nsvr/{name}", rr.Scalars(threshold))
-    stream.log(
-        "curves/nsvr/object",
-        rr.SeriesPoints(names="NSVR", colors=colours.SHAPE_CLASS["basic"], marker_sizes=4),
-        static=True,
-    )
+    for shape_class, colour in colours.SHAPE_CLASS.items():
+        stream.log(
+            f"curves/nsvr/{shape_class}",
+            rr.SeriesPoints(names=shape_class, colors=colour, marker_sizes=4),
+            static=True,
+        )
     for index, (item, split) in enumerate(sorted(items, key=lambda pair: pair[0].nsvr)):
         place = SPACING_M * np.array([index % columns, -(index // columns), 0.0])
         colour = colours.SHAPE_CLASS[item.shape_class]
@@ -91,7 +101,7 @@ def _show_object(stream: rr.RecordingStream, path: str, item: CatalogueObject, s
             f"{path}/parts/{number}",
             shown_mesh(moved(part, beside), colours.by_index(number)),
         )
-    stream.log("curves/nsvr/object", rr.Scalars(item.nsvr))
+    stream.log(f"curves/nsvr/{item.shape_class}", rr.Scalars(item.nsvr))
     repairs = "; ".join(item.repairs) or "none: closed as it came"
     stream.log(
         "notes/object",

@@ -7,11 +7,12 @@ import rerun.blueprint as rrb
 from pipeline.artifacts.sample_messages import Samples
 from pipeline.gripper.balancing import quality_histogram
 from pipeline.recording import colours
-from pipeline.recording.recording import looking, spread, step, time_panel
+from pipeline.recording.recording import looking, spread, time_panel
 
 TIMELINE = "sample"
 SHEET_COLUMNS = 10
 SHEET_SPACING = 3.0  # in r_G: clouds are 2.4 wide
+CELL_RADIUS = 0.04
 
 
 def blueprint() -> rrb.Blueprint:
@@ -22,12 +23,12 @@ def blueprint() -> rrb.Blueprint:
                 rrb.Spatial3DView(
                     origin="/world/sheet",
                     name="Clouds by growing q, units of r_G",
-                    eye_controls=looking((13.5, -45.0, 30.0), (13.5, -13.0, 0.0)),
+                    eye_controls=looking((13.5, -36.0, 22.0), (13.5, -14.0, 0.0)),
                 ),
                 rrb.Spatial3DView(
                     origin="/world/cloud",
                     name="One cloud, coloured by height",
-                    eye_controls=looking((1.6, -2.2, 1.6), (0, 0, 0)),
+                    eye_controls=looking((1.3, -1.9, 1.5), (0, 0, 0)),
                 ),
                 row_shares=[3, 2],
             ),
@@ -35,7 +36,7 @@ def blueprint() -> rrb.Blueprint:
                 rrb.BarChartView(origin="/curves/quality/train", name="q in tenths: train"),
                 rrb.BarChartView(origin="/curves/quality/test", name="q in tenths: test"),
                 rrb.BarChartView(origin="/curves/level", name="samples by level, 1 to 9"),
-                rrb.BarChartView(origin="/curves/class", name="basic, typical, complex"),
+                rrb.BarChartView(origin="/curves/class", name="by class: basic, typical, complex"),
                 rrb.TextDocumentView(origin="/notes/sample", name="Sample"),
             ),
             column_shares=[3, 2],
@@ -55,25 +56,38 @@ def show_samples(stream: rr.RecordingStream, by_split: dict[str, Samples], wante
     by_level = np.bincount(levels, minlength=10)[1:]
     stream.log("curves/level", rr.BarChart(by_level), static=True)
     stream.log("curves/class", rr.BarChart(np.bincount(classes, minlength=3)), static=True)
-    train = by_split["train"]
-    order = np.argsort(train.quality, kind="stable")
+    show_clouds(stream, by_split["train"], wanted)
+
+
+def show_clouds(stream: rr.RecordingStream, samples: Samples, wanted: int) -> None:
+    """A sheet of clouds by growing q, and one after the other over the timeline."""
+    order = np.argsort(samples.quality, kind="stable")
     chosen = order[spread(len(order), wanted)]
-    for number, index in enumerate(chosen):
-        points = train.cloud[index][train.cloud_mask[index]].astype(np.float32)
-        quality = float(train.quality[index])
-        shift = SHEET_SPACING * np.array([number % SHEET_COLUMNS, -(number // SHEET_COLUMNS), 0])
-        stream.log(
-            f"world/sheet/{number:03d}",
-            rr.Points3D(points + shift, colors=colours.by_value(np.array([quality])), radii=0.04),
-            static=True,
-        )
-        step(stream, TIMELINE, number)
-        height = points[:, 2] / 2 + 0.5 if len(points) else np.zeros(0)
-        stream.log("world/cloud", rr.Points3D(points, colors=colours.by_value(height), radii=0.04))
-        stream.log(
-            "notes/sample",
-            rr.TextDocument(
-                f"q = {quality:.3f}, p = {float(train.pressure[index]):.3f}, "
-                f"level {int(train.level[index])}, {len(points)} cells seen"
-            ),
-        )
+    clouds = [samples.cloud[i][samples.cloud_mask[i]].astype(np.float32) for i in chosen]
+    counts = [len(cloud) for cloud in clouds]
+    number = np.arange(len(chosen))
+    shifts = SHEET_SPACING * np.column_stack(
+        [number % SHEET_COLUMNS, -(number // SHEET_COLUMNS), np.zeros(len(chosen))]
+    )
+    points = np.concatenate(clouds)
+    quality = colours.by_value(samples.quality[chosen].astype(np.float64))
+    stream.log(
+        "world/sheet",
+        rr.Points3D(
+            points + np.repeat(shifts, counts, axis=0),
+            colors=np.repeat(quality, counts, axis=0),
+            radii=CELL_RADIUS,
+        ),
+        static=True,
+    )
+    steps = [rr.TimeColumn(TIMELINE, sequence=number)]
+    height = colours.by_value(points[:, 2] / 2 + 0.5)
+    shown = rr.Points3D.columns(positions=points, colors=height).partition(counts)
+    stream.send_columns("world/cloud", indexes=steps, columns=shown)
+    stream.log("world/cloud", rr.Points3D.from_fields(radii=CELL_RADIUS), static=True)
+    facts = [
+        f"q = {samples.quality[i]:.3f}, p = {samples.pressure[i]:.3f}, "
+        f"level {samples.level[i]}, {count} cells seen"
+        for i, count in zip(chosen, counts, strict=True)
+    ]
+    stream.send_columns("notes/sample", indexes=steps, columns=rr.TextDocument.columns(text=facts))

@@ -1,0 +1,211 @@
+"""URDF files as objects: the meshes and solids of their links, at their scale, as one surface.
+
+A rigid object is one link, or several that fixed joints hold together (A-2). Meshes are looked
+for beside the URDF and in its folder, never outside; URDF is in metres by its definition.
+"""
+
+import hashlib
+from pathlib import Path
+from xml.etree import ElementTree
+
+import numpy as np
+import trimesh
+from jaxtyping import Float
+from scipy.spatial.transform import Rotation
+
+from pipeline.config.objects import ObjectsConfig
+from pipeline.errors import MeshError
+from pipeline.geometry.mesh import Mesh
+from pipeline.geometry.mesh_files import (
+    MESH_SUFFIXES,
+    MeshSource,
+    check_arrays,
+    length_unit,
+    load_mesh_file,
+    read_raw_mesh,
+)
+
+URDF_SUFFIX = ".urdf"
+_PACKAGE = "package://"
+_LARGEST_URDF_MIB = 16  # a URDF names meshes and holds none
+
+
+def load_object_file(path: Path, folder: Path, name: str, config: ObjectsConfig) -> MeshSource:
+    """One object of a folder: a URDF, or a mesh file on its own. Raises MeshError."""
+    if path.suffix.lower() == URDF_SUFFIX:
+        return load_urdf_file(path, folder, name, config)
+    return load_mesh_file(path, folder, name, config)
+
+
+def standalone(files: list[Path], folder: Path) -> list[Path]:
+    """Files that are objects themselves: all but the meshes that a URDF among them places.
+
+    A URDF that cannot be read keeps none of its meshes back; loading it says why.
+    """
+    placed: set[Path] = set()
+    for path in files:
+        if path.suffix.lower() == URDF_SUFFIX:
+            try:
+                root = _root(path, folder)
+                references = [m.get("filename", "") for m in root.iter("mesh")]
+                placed |= {_resolved(reference, path, folder) for reference in references}
+            except MeshError:
+                continue
+    return [path for path in files if path.resolve() not in placed]
+
+
+def load_urdf_file(path: Path, folder: Path, name: str, config: ObjectsConfig) -> MeshSource:
+    """The object of a URDF in metres, every ``<mesh scale>`` and ``<origin>`` applied.
+
+    A link's visual geometry is taken, its collision geometry where it has none.
+
+    Raises MeshError, naming the file and the reason, where the file is no URDF, its links can
+    move against each other, or a mesh is missing, leads out of the folder or cannot be read.
+    """
+    label = path.relative_to(folder).as_posix()
+    root = _root(path, folder)
+    digest = hashlib.sha256(path.read_bytes())
+    parts: list[Mesh] = []
+    for link, root_from_link in _placed_links(label, root):
+        bodies = link.findall("visual") or link.findall("collision")
+        for body in bodies:
+            geometry = body.find("geometry")
+            if geometry is None or not len(geometry):
+                raise MeshError(f"{label} has a link without geometry", "Export it again")
+            mesh, data = _shape(label, geometry[0], path, folder, config)
+            digest.update(data)
+            parts.append(mesh.transformed(root_from_link @ _origin(label, body)))
+    if not parts:
+        raise MeshError(f"{label} has no visual or collision geometry", "Export it again")
+    starts = np.cumsum([0, *(len(part.vertices_m) for part in parts[:-1])])
+    merged = Mesh(
+        np.concatenate([part.vertices_m for part in parts]),
+        np.concatenate([part.faces + at for part, at in zip(parts, starts, strict=True)]),
+    )
+    check_arrays(label, merged, config.max_faces)
+    unit, known_by = length_unit(label, float(merged.extents_m.max()), "m", config)
+    return MeshSource(name, label, digest.hexdigest(), merged, unit, known_by)
+
+
+def _root(path: Path, folder: Path) -> ElementTree.Element:
+    label = path.relative_to(folder).as_posix()
+    if not path.resolve().is_relative_to(folder.resolve()):
+        raise MeshError(f"{label} leads out of its folder", "Copy the file into the folder")
+    if path.stat().st_size > _LARGEST_URDF_MIB * 2**20:
+        raise MeshError(f"{label} has more than {_LARGEST_URDF_MIB} MiB", "Export the URDF again")
+    try:
+        root = ElementTree.parse(path).getroot()
+    except (ElementTree.ParseError, ValueError, LookupError) as error:
+        raise MeshError(f"{label} is no XML ({error})", "Export the URDF again") from error
+    if root.tag != "robot":
+        raise MeshError(f"{label} is no URDF: its root is <{root.tag}>", "Export the URDF again")
+    return root
+
+
+def _placed_links(
+    label: str, root: ElementTree.Element
+) -> list[tuple[ElementTree.Element, Float[np.ndarray, "4 4"]]]:
+    """Every link with its pose in the root link."""
+    links = {link.get("name", ""): link for link in root.findall("link")}
+    above: dict[str, tuple[str, np.ndarray]] = {}
+    for joint in root.findall("joint"):
+        kind, parent, child = joint.get("type"), joint.find("parent"), joint.find("child")
+        if parent is None or child is None:
+            raise MeshError(f"{label} has a joint without parent or child", "Export it again")
+        if kind != "fixed":
+            raise MeshError(
+                f"{label} has a {kind} joint, and an object must be rigid",
+                "Fix the joint at the wanted pose, or export its links one by one",
+            )
+        above[child.get("link", "")] = (parent.get("link", ""), _origin(label, joint))
+    placed = []
+    for name, link in links.items():
+        pose, at = np.eye(4), name
+        for _ in range(len(links)):
+            if at not in above:
+                break
+            at, parent_from_child = above[at]
+            pose = parent_from_child @ pose
+        if at in above or at not in links:
+            raise MeshError(f"{label}: link '{name}' hangs on no root", "Mend its joints")
+        placed.append((link, pose))
+    return placed
+
+
+def _shape(
+    label: str, shape: ElementTree.Element, urdf: Path, folder: Path, config: ObjectsConfig
+) -> tuple[Mesh, bytes]:
+    """A geometry's surface in its own frame, and the bytes of the file it came from."""
+    if shape.tag == "mesh":
+        reference = shape.get("filename", "")
+        path = _resolved(reference, urdf, folder)
+        if path.suffix.lower() not in MESH_SUFFIXES:
+            raise MeshError(
+                f"{label} places '{reference}', which is none of {', '.join(MESH_SUFFIXES)}",
+                "Export that mesh as OBJ",
+            )
+        raw, _, data = read_raw_mesh(path, folder.resolve(), config)
+        scale = _numbers(label, shape.get("scale", "1 1 1"), 3)
+        if not (scale != 0).all():
+            raise MeshError(f"{label} scales '{reference}' to nothing", "Change its scale")
+        # A mirrored mesh is turned inside out, unless its faces run the other way round.
+        faces = raw.faces if scale.prod() > 0 else raw.faces[:, ::-1]
+        return Mesh(raw.vertices_m * scale, faces), data
+    if shape.tag == "box":
+        solid = trimesh.creation.box(extents=_numbers(label, shape.get("size", ""), 3))
+    elif shape.tag == "sphere":
+        (radius,) = _numbers(label, shape.get("radius", ""), 1)
+        solid = trimesh.creation.icosphere(subdivisions=4, radius=radius)
+    elif shape.tag == "cylinder":
+        (radius,) = _numbers(label, shape.get("radius", ""), 1)
+        (length,) = _numbers(label, shape.get("length", ""), 1)
+        solid = trimesh.creation.cylinder(radius=radius, height=length, sections=64)
+    else:
+        raise MeshError(f"{label} has a <{shape.tag}>, which URDF does not know", "Use a mesh")
+    return Mesh(np.array(solid.vertices), np.array(solid.faces, dtype=np.int64)), b""
+
+
+def _resolved(reference: str, urdf: Path, folder: Path) -> Path:
+    """The file that a URDF names. Raises MeshError where it is missing or outside the folder.
+
+    A ``package://`` may stand for the URDF's folder or for the whole folder, with or without the
+    package's name.
+    """
+    label, root = urdf.relative_to(folder).as_posix(), folder.resolve()
+    name = reference.removeprefix(_PACKAGE)
+    inner = name.partition("/")[2] if reference.startswith(_PACKAGE) else name
+    candidates = [base / part for part in (name, inner) for base in (urdf.parent, folder)]
+    found = [path.resolve() for path in candidates if path.is_file()]
+    if not found:
+        raise MeshError(f"{label} places '{reference}', which is not there", "Put it there")
+    inside = [path for path in found if path.is_relative_to(root)]
+    if not inside:
+        raise MeshError(
+            f"{label} places '{reference}', which leads out of its folder",
+            "Copy the mesh into the folder",
+        )
+    return inside[0]
+
+
+def _origin(label: str, holder: ElementTree.Element) -> Float[np.ndarray, "4 4"]:
+    """``<origin xyz rpy>`` of a joint or geometry: fixed axes x, y, z in turn."""
+    pose = np.eye(4)
+    origin = holder.find("origin")
+    if origin is not None:
+        angles = _numbers(label, origin.get("rpy", "0 0 0"), 3)
+        pose[:3, :3] = Rotation.from_euler("xyz", angles).as_matrix()
+        pose[:3, 3] = _numbers(label, origin.get("xyz", "0 0 0"), 3)
+    return pose
+
+
+def _numbers(label: str, text: str, count: int) -> Float[np.ndarray, " count"]:
+    """So many finite numbers; one alone stands for all of them, as some tools write scales."""
+    try:
+        numbers = np.array([float(part) for part in text.split()])
+    except ValueError:
+        numbers = np.zeros(0)
+    if len(numbers) == 1 and count > 1:
+        numbers = np.repeat(numbers, count)
+    if len(numbers) != count or not np.isfinite(numbers).all():
+        raise MeshError(f"{label} has '{text}' where {count} numbers belong", "Mend that line")
+    return numbers

@@ -1,0 +1,1 @@
+"""The dataset in formats that grasp-learning code already loads: written, never read, by us."""

@@ -1,0 +1,57 @@
+"""Grasps by object and in its frame, as datasets of single objects hold them.
+
+The gripper's base frame of these formats has its +z along the approach, into the object; GCS has
+its +z out of it. Both have their origin at the pad's centre where it first touches.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from jaxtyping import Bool, Float, Int
+
+from pipeline.geometry.catalogue import CatalogueObject
+from pipeline.geometry.mesh import Mesh
+from pipeline.geometry.transforms import invert
+
+# Half a turn about x: its own inverse.
+GCS_FROM_BASE = np.diag([1.0, -1.0, -1.0, 1.0])
+
+
+@dataclass(frozen=True)
+class ObjectGrasps:
+    """All grasps of one object, whatever scene they are from; arrays of one length n.
+
+    object_from_base : (n, 4, 4) gripper base, +z along the approach, in the object's frame.
+    quality, pressure, wrench : (n,), (n,), (n, 4) q, p and GW, as labelled in the scene.
+    level : (n,) of Table II. scene : (n,) name of the scene: a label holds among its neighbours.
+    """
+
+    item: CatalogueObject
+    split: str
+    object_from_base: Float[np.ndarray, "n 4 4"]
+    quality: Float[np.ndarray, " n"]
+    pressure: Float[np.ndarray, " n"]
+    wrench: Float[np.ndarray, "n 4"]
+    level: Int[np.ndarray, " n"]
+    scene: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.quality)
+
+    def successful(self, least_quality: float) -> Bool[np.ndarray, " n"]:
+        """What these formats call a success: a label of at least ``least_quality``."""
+        return self.quality >= least_quality
+
+
+def base_in_object(
+    world_from_object: Float[np.ndarray, "4 4"], world_from_gripper: Float[np.ndarray, "n 4 4"]
+) -> Float[np.ndarray, "n 4 4"]:
+    """Poses of GCS in the world → poses of the formats' gripper base in the object's frame."""
+    return np.asarray(invert(world_from_object) @ world_from_gripper @ GCS_FROM_BASE)
+
+
+def obj_text(mesh: Mesh) -> str:
+    """A mesh as Wavefront OBJ, in metres, to a hundredth of a micrometre."""
+    surface = trimesh.Trimesh(mesh.vertices_m, mesh.faces, process=False)
+    return str(surface.export(file_type="obj", include_normals=False, digits=8))

@@ -1,0 +1,38 @@
+"""Training samples as WebDataset tars: a tar a shard, three files a sample."""
+
+from pathlib import Path
+
+import webdataset
+
+from pipeline.artifacts.publishing import published
+from pipeline.artifacts.sample_messages import Samples
+from pipeline.geometry.shape import ShapeClass
+
+CLASSES = tuple(str(kind) for kind in ShapeClass)
+
+
+def write_webdataset(
+    path: Path, samples: Samples, names: tuple[str, ...], prefix: str, first: int
+) -> None:
+    """One tar: ``<key>.cloud.npy`` (f2), ``<key>.mask.npy`` (b1) and ``<key>.json`` a sample.
+
+    Clouds are (g, g, 3) in units of r_G; the json has q, p, level, class and object.
+    names : what ``object_index`` points into. Keys are ``prefix`` and a
+    number, which is ``first`` for the first sample.
+    """
+    with published(path) as scratch, webdataset.TarWriter(str(scratch), mtime=0) as tar:
+        for row in range(len(samples)):
+            tar.write(
+                {
+                    "__key__": f"{prefix}{first + row:08d}",
+                    "cloud.npy": samples.cloud[row],
+                    "mask.npy": samples.cloud_mask[row],
+                    "json": {
+                        "quality": float(samples.quality[row]),
+                        "pressure": float(samples.pressure[row]),
+                        "level": int(samples.level[row]),
+                        "shape_class": CLASSES[samples.shape_class[row]],
+                        "object": names[samples.object_index[row]],
+                    },
+                }
+            )

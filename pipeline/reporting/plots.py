@@ -1,0 +1,216 @@
+"""Figures of the report: vector, with units, told apart in print and by colour-blind eyes.
+
+The same numbers give the same bytes. Curves differ in colour (Okabe and Ito, 2008), marker and
+dash, so that a page printed in grey still reads.
+"""
+
+import io
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from pipeline.geometry.shape import COMPLEX_FROM, TYPICAL_FROM
+from pipeline.recording.colours import PALETTE, SHAPE_CLASS, SPLIT
+
+MARKERS = "osD^vPX*"
+DASHES = ("-", "--", "-.", ":")
+STYLE = {
+    "svg.hashsalt": "softgrip",
+    "svg.fonttype": "none",
+    "font.family": "sans-serif",
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "0.9",
+    "legend.frameon": False,
+}
+WIDTH_IN = 6.4
+
+
+@dataclass(frozen=True)
+class TrainedMember:
+    """A network of Fig. 1. channels : its four stages. error : mean |q-hat - q|."""
+
+    channels: tuple[int, ...]
+    layers: int
+    error: float
+    ms_a_grasp: float
+    chosen: bool
+
+
+@dataclass(frozen=True)
+class Rate:
+    """A success rate with its interval, both in [0, 1]."""
+
+    rate: float
+    low: float
+    high: float
+
+
+def nsvr_scale(nsvr: Mapping[str, float], shape_class: Mapping[str, str]) -> str:
+    """Every object's NSVR, Eq. (15), in order, with the two thresholds."""
+    ordered = sorted(nsvr, key=lambda name: (nsvr[name], name))
+    place = {name: index + 1 for index, name in enumerate(ordered)}
+    with mpl.rc_context(STYLE):
+        figure, (axes,) = _axes(1, 2.4)
+        for (kind, colour), marker in zip(SHAPE_CLASS.items(), MARKERS, strict=False):
+            own = [name for name in ordered if shape_class[name] == kind]
+            x, y = [place[name] for name in own], [nsvr[name] for name in own]
+            axes.plot(x, y, marker, color=_rgb(colour), label=f"{kind} ({len(own)})", ms=5)
+        for threshold in (TYPICAL_FROM, COMPLEX_FROM):
+            axes.axhline(threshold, color="0.3", lw=0.8, ls="--")
+            axes.annotate(f"{threshold}", (0.2, threshold), va="bottom", color="0.3")
+        axes.set(xlabel="objects by growing NSVR", ylabel="NSVR [1]")
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        axes.legend()
+        return _svg(figure)
+
+
+def label_histogram(by_split: Mapping[str, Sequence[int]]) -> str:
+    """Labels by tenth of q, a bar a split."""
+    with mpl.rc_context(STYLE):
+        figure, (axes,) = _axes(1, 2.4)
+        width = 0.8 / len(by_split)
+        for number, (split, counts) in enumerate(by_split.items()):
+            x = np.arange(len(counts)) + 0.1 + width * (number + 0.5)
+            bars: dict[str, Any] = {
+                "color": _rgb(SPLIT[split]),
+                "hatch": ("", "///", "xxx")[number % 3],
+            }
+            axes.bar(x, counts, width, label=f"{split} ({sum(counts)})", ec="white", **bars)
+        axes.set_xticks(range(11), [f"{tenth / 10:.1f}" for tenth in range(11)])
+        axes.set(xlabel="grasp quality q [1]", ylabel="grasps")
+        axes.legend()
+        return _svg(figure)
+
+
+def training_curve(
+    train: Sequence[float], val: Sequence[float], best_epoch: int, mean_predictor: float
+) -> str:
+    """Error by epoch; epochs are counted from 1 in the figure, ``best_epoch`` from 0."""
+    with mpl.rc_context(STYLE):
+        figure, (axes,) = _axes(1, 2.6)
+        epochs = np.arange(len(train)) + 1
+        axes.plot(epochs, train, "o-", color=_rgb(PALETTE[4]), label="train", ms=3)
+        axes.plot(epochs, val, "s--", color=_rgb(PALETTE[5]), label="val", ms=3)
+        axes.axhline(mean_predictor, color="0.4", ls=":", label="mean predictor, on test")
+        axes.axvline(best_epoch + 1, color="0.6", lw=0.8, label=f"best epoch: {best_epoch + 1}")
+        axes.set(xlabel="epoch", ylabel="mean |q̂ − q| [1]")
+        axes.set_ylim(bottom=0)
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+        axes.legend(ncols=2)
+        return _svg(figure)
+
+
+def calibration(predicted: Sequence[float], true: Sequence[float], count: Sequence[int]) -> str:
+    """Mean q over mean q-hat by tenth of q-hat; dots grow with the number of grasps."""
+    with mpl.rc_context(STYLE):
+        figure, (axes,) = _axes(1, 3.0, width=3.4)
+        axes.plot([0, 1], [0, 1], color="0.6", lw=0.8, ls="--", label="perfect")
+        size = 10 + 90 * np.asarray(count) / max(*count, 1)
+        axes.plot(predicted, true, color=_rgb(PALETTE[4]), lw=1)
+        axes.scatter(predicted, true, s=size, color=_rgb(PALETTE[4]), zorder=3, label="test")
+        axes.set(xlabel="mean predicted q̂ [1]", ylabel="mean true q [1]", xlim=(0, 1), ylim=(0, 1))
+        axes.set_aspect("equal")
+        axes.legend(loc="upper left")
+        return _svg(figure)
+
+
+def fig_1(members: Sequence[TrainedMember], mean_predictor: float) -> str:
+    """Supplement IV, Fig. 1: error and time against depth, a curve a channel set."""
+    with mpl.rc_context(STYLE):
+        figure, (errors, times) = _axes(2, 3.0)
+        for number, channels in enumerate(sorted({member.channels for member in members})):
+            own = sorted((m for m in members if m.channels == channels), key=lambda m: m.layers)
+            line: dict[str, Any] = {
+                "marker": MARKERS[number % len(MARKERS)],
+                "ls": DASHES[number % len(DASHES)],
+                "color": _rgb(PALETTE[(4, 5, 2, 6, 0, 1)[number % 6]]),
+                "label": "-".join(map(str, channels)),
+                "ms": 4,
+            }
+            layers = [member.layers for member in own]
+            errors.plot(layers, [member.error for member in own], **line)
+            times.plot(layers, [member.ms_a_grasp for member in own], **line)
+        for member in members:
+            if member.chosen:
+                ring: dict[str, Any] = {
+                    "marker": "o",
+                    "ms": 12,
+                    "mfc": "none",
+                    "mec": "0.2",
+                    "ls": "",
+                }
+                errors.plot([member.layers], [member.error], label="chosen", **ring)
+                times.plot([member.layers], [member.ms_a_grasp], **ring)
+        errors.axhline(mean_predictor, color="0.4", ls=":", lw=1, label="mean predictor")
+        errors.set(xlabel="layers", ylabel="mean |q̂ − q| on test [1]")
+        times.set(xlabel="layers", ylabel="time a grasp [ms]")
+        times.set_ylim(bottom=0)
+        figure.legend(*errors.get_legend_handles_labels(), loc="outside lower center", ncols=3)
+        return _svg(figure)
+
+
+def success_by_level(rates: Mapping[str, Mapping[int, Rate]]) -> str:
+    """Success of each policy at each level, with its 95 % interval."""
+    with mpl.rc_context(STYLE):
+        figure, (axes,) = _axes(1, 2.8)
+        for number, (policy, by_level) in enumerate(rates.items()):
+            shift = 0.12 * (number - (len(rates) - 1) / 2)
+            x = [level + shift for level in by_level]
+            y = np.array([rate.rate for rate in by_level.values()])
+            low = np.array([rate.low for rate in by_level.values()])
+            high = np.array([rate.high for rate in by_level.values()])
+            axes.errorbar(
+                x,
+                100 * y,
+                yerr=100 * np.maximum([y - low, high - y], 0),
+                fmt=MARKERS[number % len(MARKERS)],
+                color=_rgb(PALETTE[(4, 5, 2, 6, 0, 1)[number % 6]]),
+                capsize=2,
+                ms=5,
+                label=policy,
+            )
+        levels = sorted({level for by_level in rates.values() for level in by_level})
+        axes.set_xticks(levels)
+        axes.set_xlim(levels[0] - 0.6, levels[-1] + 0.6)
+        axes.set(xlabel="clutter level of Table II", ylabel="lifted [% of attempts]")
+        axes.set_ylim(0, 103)
+        axes.legend(ncols=3, loc="lower left")
+        return _svg(figure)
+
+
+def wall_times(seconds: Mapping[str, float]) -> str:
+    """Wall time of each stage."""
+    with mpl.rc_context(STYLE):
+        figure, (axes,) = _axes(1, 0.6 + 0.28 * len(seconds))
+        names = list(seconds)[::-1]
+        bars = axes.barh(names, [seconds[name] for name in names], color=_rgb(PALETTE[1]))
+        axes.bar_label(bars, [f"{seconds[name]:.1f} s" for name in names], padding=3)
+        axes.set(xlabel="wall time [s]")
+        axes.margins(x=0.15)
+        axes.grid(visible=False, axis="y")
+        return _svg(figure)
+
+
+def _axes(columns: int, height_in: float, width: float = WIDTH_IN) -> tuple[Figure, list[Axes]]:
+    figure = Figure(figsize=(width, height_in), layout="constrained")
+    return figure, list(figure.subplots(1, columns, squeeze=False)[0])
+
+
+def _rgb(colour: np.ndarray) -> tuple[float, ...]:
+    return tuple(float(part) / 255 for part in colour)
+
+
+def _svg(figure: Figure) -> str:
+    text = io.StringIO()
+    figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
+    return text.getvalue()

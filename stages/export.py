@@ -1,0 +1,209 @@
+"""`make export`: a run's dataset in a format that other grasp-learning code already loads."""
+
+import json
+import sys
+from collections.abc import Iterator, Mapping
+from enum import StrEnum
+from functools import partial
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from loguru import logger
+
+from pipeline.artifacts import (
+    from_tensor,
+    open_artifact,
+    package_version,
+    publish_bytes,
+    read_provenance,
+)
+from pipeline.artifacts.grasp_messages import grasps_of
+from pipeline.artifacts.object_messages import read_objects
+from pipeline.artifacts.sample_messages import Samples, joined_samples, samples_of
+from pipeline.artifacts.sharding import listed_shards
+from pipeline.config import load_run_config
+from pipeline.errors import ArtifactError, MachineError, SoftgripError
+from pipeline.execution import RunFolder, progress
+from pipeline.geometry.catalogue import CatalogueObject
+from pipeline.interchange.graspgen import write_graspgen, write_lists
+from pipeline.interchange.object_grasps import ObjectGrasps, base_in_object
+from pipeline.interchange.parquet_shards import write_parquet
+from schemas.softgrip.v1.grasps_pb2 import GraspBatch
+from schemas.softgrip.v1.samples_pb2 import SampleBatch
+from schemas.softgrip.v1.scenes_pb2 import Scene
+from stages.graph import RUNS_DIR
+
+SPLITS = ("train", "val", "test")
+MANIFEST = "manifest.json"
+
+
+class Format(StrEnum):
+    """What a run can be exported to."""
+
+    ACRONYM = "acronym"
+    GRASPGEN = "graspgen"
+    WEBDATASET = "webdataset"
+    PARQUET = "parquet"
+
+
+def export_run(folder: RunFolder, wanted: Format, least_quality: float) -> Path:
+    """Write ``<run>/export/<format>/``, its manifest last; the folder that it wrote.
+
+    Raises
+    ------
+    ArtifactError : what is to be exported was not made yet.
+    MachineError : the package that writes the format is not installed.
+    """
+    of_objects = wanted in (Format.ACRONYM, Format.GRASPGEN)
+    source = folder.artifact("grasps" if of_objects else "shards")
+    if not source.is_file():
+        name = folder.path.name
+        raise ArtifactError(f"{source} is missing", f"Make it first: make dataset RUN={name}")
+    into = folder.path / "export" / wanted
+    (into / MANIFEST).unlink(missing_ok=True)
+    try:
+        if of_objects:
+            count = export_grasps(folder, into, wanted, least_quality)
+        else:
+            count = export_samples(source, into, wanted)
+    except ModuleNotFoundError as error:
+        raise MachineError(
+            f"Format {wanted} needs the package {error.name}, which is not installed",
+            "Install it: pip install -c constraints.txt -e '.[export]'",
+        ) from error
+    manifest = {
+        "format": str(wanted),
+        "grasps" if of_objects else "samples": count,
+        "source": {source.name: read_provenance(source).key},
+        "softgrip": package_version(),
+    }
+    if of_objects:
+        manifest["success"] = f"q >= {least_quality}"
+        manifest["frame"] = "origin at the pad's centre at first touch, +z along the approach"
+    publish_bytes(into / MANIFEST, (json.dumps(manifest, indent=2) + "\n").encode())
+    return into
+
+
+def export_grasps(folder: RunFolder, into: Path, wanted: Format, least_quality: float) -> int:
+    """One file an object; how many grasps."""
+    write = partial(write_graspgen, into, least_quality=least_quality)
+    if wanted is Format.ACRONYM:
+        from pipeline.interchange.acronym import write_acronym  # h5py is an extra
+
+        config = load_run_config(folder.config)
+        density, friction = config.objects.density_kg_m3, config.gripper.friction
+        write = partial(
+            write_acronym, into, least_quality=least_quality, density=density, friction=friction
+        )
+    found = grasps_by_object(folder)
+    for grasps in progress(found, len(found), f"export: {wanted}", "object"):
+        write(grasps)
+    if wanted is Format.GRASPGEN:
+        write_lists(into, [(grasps.item.name, grasps.split) for grasps in found])
+    return sum(map(len, found))
+
+
+def grasps_by_object(folder: RunFolder) -> list[ObjectGrasps]:
+    """Every object that has grasps, in the catalogue's order, with all of them."""
+    objects = read_objects(folder.artifact("objects"))
+    with open_artifact(folder.artifact("scenes")) as artifact:
+        poses = {
+            (scene.scene_id, placed.body_id): from_tensor(placed.world_from_object)
+            for _, scene in artifact.messages(Scene)
+            for placed in scene.objects
+        }
+    parts: dict[str, list[ObjectGrasps]] = {}
+    for shard in listed_shards(folder.artifact("grasps")):
+        with open_artifact(shard) as artifact:
+            for _, message in artifact.messages(GraspBatch):
+                for part in by_body(message, objects, poses):
+                    parts.setdefault(part.item.name, []).append(part)
+    return [joined(parts[name]) for name in objects if name in parts]
+
+
+def by_body(
+    message: GraspBatch,
+    objects: Mapping[str, tuple[CatalogueObject, str]],
+    poses: dict[tuple[str, int], np.ndarray],
+) -> Iterator[ObjectGrasps]:
+    """The grasps of a batch, body by body, in the frame of the body's object."""
+    origin, grasps = grasps_of(message)
+    for body in np.unique(grasps.body_id):
+        rows = np.flatnonzero(grasps.body_id == body)
+        name = origin.object_names[int(grasps.object_index[rows[0]])]
+        item, split = objects[name]
+        world_from_object = poses[origin.scene_id, int(body)]
+        yield ObjectGrasps(
+            item=item,
+            split=split,
+            object_from_base=base_in_object(world_from_object, grasps.world_from_gripper[rows]),
+            quality=grasps.quality[rows],
+            pressure=grasps.pressure[rows],
+            wrench=grasps.wrench[rows],
+            level=np.full(len(rows), origin.level),
+            scene=(origin.scene_id,) * len(rows),
+        )
+
+
+def joined(parts: list[ObjectGrasps]) -> ObjectGrasps:
+    """Several sets of one object's grasps as one."""
+    arrays = ("object_from_base", "quality", "pressure", "wrench", "level")
+    return ObjectGrasps(
+        item=parts[0].item,
+        split=parts[0].split,
+        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in arrays},
+        scene=sum((part.scene for part in parts), ()),
+    )
+
+
+def export_samples(source: Path, into: Path, wanted: Format) -> int:
+    """One file a shard, named by split; how many samples."""
+    write, suffix = write_parquet, ".parquet"
+    if wanted is Format.WEBDATASET:
+        from pipeline.interchange.tar_shards import write_webdataset  # webdataset is an extra
+
+        write, suffix = write_webdataset, ".tar"
+    total = 0
+    for split in SPLITS:
+        shards = listed_shards(source, [split])
+        first = 0
+        for number, shard in enumerate(progress(shards, len(shards), f"export: {split}", "shard")):
+            samples, names = read_shard(shard)
+            write(into / f"{split}-{number:06d}{suffix}", samples, names, f"{split}-", first)
+            first += len(samples)
+        total += first
+    return total
+
+
+def read_shard(shard: Path) -> tuple[Samples, tuple[str, ...]]:
+    """All samples of a shard, and the names their objects point into."""
+    with open_artifact(shard) as artifact:
+        messages = [message for _, message in artifact.messages(SampleBatch)]
+    return joined_samples([samples_of(m) for m in messages]), tuple(messages[0].object_names)
+
+
+def export(
+    wanted: Annotated[Format, typer.Option("--format", envvar="FORMAT", help="which format")],
+    run: Annotated[str, typer.Option(envvar="RUN", help="name of the run")] = "default",
+    runs_dir: Annotated[Path, typer.Option(help="folder of all runs")] = RUNS_DIR,
+    success_quality: Annotated[
+        float, typer.Option(min=0, max=1, help="q from which on a grasp counts as a success")
+    ] = 0.5,
+) -> None:
+    """Write a run's dataset in another format, to runs/<run>/export/<format>/."""
+    into = export_run(RunFolder(runs_dir / run), wanted, success_quality)
+    logger.info("export: {}", into)
+
+
+if __name__ == "__main__":
+    logger.remove()
+    logger.add(sys.stderr, level="INFO", format="{message}")
+    app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+    app.command()(export)
+    try:
+        app()
+    except SoftgripError as error:
+        logger.error("export: {}", error)
+        sys.exit(1)
