@@ -27,9 +27,8 @@ from pipeline.reporting.facts import (
 from pipeline.reporting.failures import failure_picture
 from pipeline.reporting.page import html_page, markdown_page
 from schemas.softgrip.v1.scenes_pb2 import Scene
-from stages.graph import RUNS_DIR, STAGES
+from stages.graph import MADE, RUNS_DIR, SWEEP
 
-SWEEP = "sweep"
 GOALS = {"evaluate": "eval"}  # what `make` calls a stage, where it is another word
 FAILURES = 8
 FIRST_POLICY = "GA-CNN"  # of an evaluation without baselines
@@ -45,7 +44,7 @@ def make_report(folder: RunFolder) -> Path:
     """
     run = folder.path.name
     config = load_run_config(folder.config)
-    names = [*STAGES, *([] if SWEEP in STAGES else [SWEEP])]
+    names = list(MADE)
     summaries = {name: read_summary(folder.summary(name)) for name in names}
     if summaries["objects"] is None:
         raise ArtifactError(
@@ -144,7 +143,7 @@ def figures_of(
         )
         predicted, true, count = zip(*facts.calibration, strict=True)
         svg["calibration"] = plots.calibration(predicted, true, count)
-    if sweep := summaries[SWEEP]:
+    if sweep := summaries[SWEEP.name]:
         members = [
             plots.TrainedMember(
                 channels=tuple(network["channels"]),
