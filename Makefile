@@ -58,7 +58,7 @@ $(R)/%.mcap: $(STATE)/%.key
 # Several processes train one network where RANKS says so.
 ifneq (,$(strip $(RANKS)))
 $(R)/train.mcap: $(STATE)/train.key
-	@$(PY) -m torch.distributed.run --standalone --nproc-per-node=$(RANKS) -m stages.train --run $(RUN)
+	@$(PY) -m torch.distributed.run --standalone --nproc-per-node=$(RANKS) -m -- stages.train --run $(RUN)
 endif
 
 # A key file is looked at every time and rewritten only when its digest changed.

@@ -1,7 +1,8 @@
 """Stage 5, train: shards → a trained GA-CNN and its error on objects never seen in training.
 
 On several GPUs, or several processes of one machine: ``make train RANKS=2``, which is
-``torchrun --nproc-per-node=2 -m stages.train``. All processes train, the first does the rest.
+``torchrun --nproc-per-node=2 -m -- stages.train --run NAME``. All processes train, the first does
+the rest.
 """
 
 from collections import Counter

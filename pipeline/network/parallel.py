@@ -1,8 +1,8 @@
 """Several processes that train one network: what each must know and exchange.
 
-``torchrun --nproc-per-node N -m stages.train`` starts N equal processes. Each computes the
-gradients of its part of a batch; ``DistributedDataParallel`` averages them, so all take the same
-step. Batch normalisation takes its mean and variance over the whole batch too, so that N processes
+``torchrun --nproc-per-node=N -m -- stages.train --run NAME`` starts N equal processes. Each
+computes the gradients of its part of a batch; ``DistributedDataParallel`` averages them, so all
+take the same step. Batch normalisation takes its mean and variance over the whole batch too, so that N processes
 compute what one computes, up to the order of summation.
 """
 
@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import torch
 from jaxtyping import Float
 from torch import Tensor, distributed, nn
-from torch.distributed.nn.functional import all_reduce
 
 
 @dataclass(frozen=True)
@@ -62,6 +61,22 @@ def joined_ranks() -> Iterator[Ranks]:
         distributed.destroy_process_group()
 
 
+class _SumOverRanks(torch.autograd.Function):
+    """Sum over all processes, through which gradients pass: they add up as well."""
+
+    @staticmethod
+    def forward(context: object, values: Tensor) -> Tensor:
+        total = values.clone()
+        distributed.all_reduce(total)
+        return total
+
+    @staticmethod
+    def backward(context: object, *gradients: Tensor) -> Tensor:
+        (total,) = (gradient.clone() for gradient in gradients)
+        distributed.all_reduce(total)
+        return total
+
+
 class SyncedBatchNorm(nn.BatchNorm2d):
     """Batch normalisation over the batch of all processes.
 
@@ -72,10 +87,13 @@ class SyncedBatchNorm(nn.BatchNorm2d):
         """Normalise; in training by the moments of the whole batch."""
         if not self.training:
             return super().forward(input)
-        variance, mean = torch.var_mean(input.double(), dim=(0, 2, 3), unbiased=False)
+        variance, mean = torch.var_mean(input, dim=(0, 2, 3), unbiased=False)
+        variance, mean = variance.double(), mean.double()
         cells = input.new_full((1,), input.numel() / input.shape[1], dtype=torch.float64)
         # Count, first and second moment: what adds up over processes.
-        sums = all_reduce(torch.cat((cells, cells * mean, cells * (variance + mean * mean))))
+        sums: Tensor = _SumOverRanks.apply(
+            torch.cat((cells, cells * mean, cells * (variance + mean * mean)))
+        )
         total = sums[0].detach()
         mean, square = (sums[1:] / total).chunk(2)
         variance = square - mean * mean

@@ -121,7 +121,7 @@ def train(
             standing = load_standing(state_path, identity, model, optimizer, standing)
         forward: nn.Module = model
         if ranks.count > 1:
-            forward = DistributedDataParallel(model, broadcast_buffers=False)
+            forward = DistributedDataParallel(model, forward_sync_buffers=False)
 
         batches_per_epoch = batch_count(len(train_set), config.batch_size)
         total_steps = config.epochs * batches_per_epoch

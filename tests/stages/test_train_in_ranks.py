@@ -1,4 +1,4 @@
-"""``torchrun -m stages.train``: two processes make the one artifact, from the same samples."""
+"""``torchrun -m -- stages.train``: two processes make the one artifact, from the same samples."""
 
 import json
 import os
@@ -20,7 +20,7 @@ def test_two_processes_publish_once_what_one_would(run: RunFolder, tmp_path: Pat
     done = subprocess.run(
         [
             *(sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node=2"),
-            *("-m", "stages.train", "--run", "tiny", "--runs-dir", str(tmp_path)),
+            *("-m", "--", "stages.train", "--run", "tiny", "--runs-dir", str(tmp_path)),
         ],
         cwd=ROOT,
         env={k: v for k, v in os.environ.items() if k not in ("MESH_DIR", "RUN", "WORKERS")},
