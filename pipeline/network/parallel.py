@@ -2,8 +2,8 @@
 
 ``torchrun --nproc-per-node=N -m -- stages.train --run NAME`` starts N equal processes. Each
 computes the gradients of its part of a batch; ``DistributedDataParallel`` averages them, so all
-take the same step. Batch normalisation takes its mean and variance over the whole batch too, so that N processes
-compute what one computes, up to the order of summation.
+take the same step. Batch normalisation takes its mean and variance over the whole batch too, so
+that N processes compute what one computes, up to the order of summation.
 """
 
 import os
@@ -91,9 +91,8 @@ class SyncedBatchNorm(nn.BatchNorm2d):
         variance, mean = variance.double(), mean.double()
         cells = input.new_full((1,), input.numel() / input.shape[1], dtype=torch.float64)
         # Count, first and second moment: what adds up over processes.
-        sums: Tensor = _SumOverRanks.apply(
-            torch.cat((cells, cells * mean, cells * (variance + mean * mean)))
-        )
+        moments = torch.cat((cells, cells * mean, cells * (variance + mean * mean)))
+        sums: Tensor = _SumOverRanks.apply(moments)  # type: ignore[no-untyped-call]
         total = sums[0].detach()
         mean, square = (sums[1:] / total).chunk(2)
         variance = square - mean * mean
