@@ -20,8 +20,10 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
+from pipeline.network.measured_drape import draped_gap
+
 # What the input's channels hold, in order.
-CHANNELS = ("x", "y", "z", "z_fine", "radius", "seen")
+CHANNELS = ("x", "y", "z", "z_fine", "radius", "seen", "gap", "contact")
 INPUT_CHANNELS = len(CHANNELS)
 X_CHANNEL, Y_CHANNEL = CHANNELS.index("x"), CHANNELS.index("y")
 
@@ -31,6 +33,9 @@ Z_LIMIT = 1.2
 # A seal is lost to steps of a few millimetres, Delta_d of Table I: the finer channel spreads
 # +-0.16 r_G = +-4 mm over [-1, 1] so that the first convolution need not.
 Z_FINE_LIMIT = 0.16
+# A cell this near the draped pad counts as in contact: half a millimetre, what noise leaves of the
+# label's 0.1 mm.
+CONTACT_GAP = 0.02
 # The reference height is taken over the middle third of the grid.
 _REFERENCE_PART = 3
 
@@ -51,12 +56,14 @@ def network_input(
     -------
     Channels as in ``CHANNELS``, single precision: x, y as measured; z from the reference height,
     bounded to ±1.2 (H / r_G); the same bounded to ±0.16 and stretched to ±1; distance from the
-    axis; 1 where seen. Unseen cells are zero in every channel.
+    axis; 1 where seen; how far the pad draped on the cloud stays above (see `measured_drape`),
+    in units of the fine channel; 1 where it touches. Unseen cells are zero in every channel.
     """
     seen = mask.unsqueeze(-1)
     points = torch.where(seen, cloud.float(), 0.0)
     x, y, z = points.unbind(-1)
     z = torch.where(mask, z - reference_height(z, mask)[:, None, None], 0.0)
+    gap = draped_gap(z, mask)
     channels = (
         x,
         y,
@@ -64,6 +71,8 @@ def network_input(
         z.clamp(-Z_FINE_LIMIT, Z_FINE_LIMIT) / Z_FINE_LIMIT,
         torch.sqrt(x * x + y * y),
         mask.float(),
+        gap / Z_FINE_LIMIT,
+        (mask & (gap <= CONTACT_GAP)).float(),
     )
     return torch.stack(channels, dim=1)
 
