@@ -111,9 +111,10 @@ def budgeted(config: RunConfig, shards: Path, cache: Path, split: str) -> Sample
 
 def budget_of(config: RunConfig, member: Member) -> TrainConfig:
     """The run's training, cut to the budget; members train side by side, each on one thread."""
-    epochs = config.sweep.epochs
-    cut = {"epochs": epochs, "patience_epochs": epochs, "threads": 1, "augment": member.augment}
-    return config.train.model_copy(update=cut)
+    sweep = config.sweep
+    cut = {"epochs": sweep.epochs, "patience_epochs": sweep.epochs, "batch_size": sweep.batch_size}
+    own = {"threads": 1, "augment": member.augment}
+    return config.train.model_copy(update={**cut, **own})
 
 
 def train_member(job: MemberJob) -> Path:
@@ -203,7 +204,7 @@ def budget_message(config: RunConfig, given: dict[str, Samples]) -> SweepBudget:
         val_samples=len(given["val"]),
         test_samples=len(given["test"]),
         epochs=config.sweep.epochs,
-        batch_size=config.train.batch_size,
+        batch_size=config.sweep.batch_size,
         mean_predictor_mae=mean_predictor_mae(given["train"].quality, given["test"].quality),
     )
 

@@ -64,3 +64,4 @@ class SweepConfig(Section):
     samples: int = Field(8192, ge=16, description="training samples, the first of their split")
     held_out_samples: int = Field(4096, ge=16, description="of the val and of the test split, each")
     epochs: int = Field(6, ge=1, le=10_000, description="passes over the samples")
+    batch_size: int = Field(128, ge=2, le=65536, description="samples in one step")
