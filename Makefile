@@ -29,7 +29,7 @@ ifeq (,$(strip $(WORKERS)))
 unexport WORKERS
 endif
 
-.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery review report export lint clean FORCE
+.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery review report export lint fuzz regress clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -120,6 +120,11 @@ lint: .venv/.ready
 	$(PY) -m ruff format --check .
 	$(PY) -m mypy
 	$(PY) -m schemas.generate --check
+
+SECONDS_A_READER ?= 60
+fuzz: .venv/.ready  ## coverage-guided fuzzing of the readers, SECONDS_A_READER each
+	@for reader in mesh toml mcap checkpoint; do \
+	  $(PY) -m tests.fuzz $$reader --seconds $(SECONDS_A_READER) || exit 1; done
 
 clean:  ## remove what run RUN produced, keep its run.toml
 	find $(R) -mindepth 1 ! -name run.toml -delete

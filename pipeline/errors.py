@@ -32,6 +32,13 @@ class ArtifactError(SoftgripError):
     """A file between two stages is missing, damaged or of another version."""
 
 
+class ContentError(ArtifactError):
+    """What a message holds cannot be used; the reader of its file adds the file's name."""
+
+    def __init__(self, what: str, remedy: str = "The file is damaged: make it again") -> None:
+        super().__init__(what, remedy)
+
+
 class SceneError(SoftgripError):
     """A clutter scene misses its level's definition."""
 

@@ -51,6 +51,17 @@ class BoundedFile(io.BufferedReader):
             raise self.damaged(f"it declares {size} bytes where {self.size - self.tell()} are left")
         return super().read(size)
 
+    def seek(self, target: int, whence: int = io.SEEK_SET, /) -> int:
+        """As of any file.
+
+        Raises
+        ------
+        ArtifactError : a place outside the file is asked for.
+        """
+        if whence == io.SEEK_SET and not 0 <= target <= self.size:
+            raise self.damaged(f"it points to byte {target} of {self.size}")
+        return super().seek(target, whence)
+
     def read_at(self, offset: int, size: int) -> bytes:
         """Exactly ``size`` bytes from ``offset``."""
         if not 0 <= offset <= self.size - size:

@@ -5,7 +5,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from pipeline.artifacts.tensors import from_tensor, to_tensor
+from pipeline.artifacts.tensors import tensors_of, to_tensor
+from pipeline.errors import ContentError
 from schemas.softgrip.v1.grasps_pb2 import GraspBatch
 
 # What each array is stored as; the field names are those of the message.
@@ -27,6 +28,16 @@ STORED_AS = {
     "cloud": "f2",
     "cloud_mask": "u1",
     "touch_height_m": "f8",
+}
+SHAPES = {
+    **dict.fromkeys(STORED_AS, "n"),
+    "world_from_gripper": "n 4 4",
+    "wrench": "n 4",
+    "limit_slack": "n k",
+    "weight_summary": "n 3",
+    "contact_mask": "n v",
+    "cloud": "n g g 3",
+    "cloud_mask": "n g g",
 }
 
 
@@ -106,8 +117,17 @@ def grasp_batch(origin: GraspOrigin, grasps: LabelledGrasps) -> GraspBatch:
 
 
 def grasps_of(message: GraspBatch) -> tuple[GraspOrigin, LabelledGrasps]:
-    """The grasps of a message: views of its bytes wherever possible."""
-    arrays = {name: from_tensor(getattr(message, name)) for name in STORED_AS}
+    """The grasps of a message: views of its bytes wherever possible.
+
+    Raises
+    ------
+    ContentError : a tensor is missing, or they do not fit together.
+    """
+    arrays = tensors_of(message, STORED_AS, SHAPES)
+    if arrays["contact_mask"].shape[1] != -(-message.pad_vertices // 8):
+        raise ContentError(f"A contact mask is not of {message.pad_vertices} pad vertices")
+    if (arrays["object_index"] >= len(message.object_names)).any():
+        raise ContentError("A grasp is of an object that has no name")
     arrays["contact_mask"] = np.unpackbits(
         arrays["contact_mask"], axis=1, count=message.pad_vertices
     ).view(bool)

@@ -6,7 +6,8 @@ from typing import cast
 import numpy as np
 
 from pipeline.artifacts.reading import open_artifact
-from pipeline.artifacts.tensors import from_tensor, to_tensor
+from pipeline.artifacts.tensors import from_tensor, tensors_of, to_tensor
+from pipeline.errors import ContentError
 from pipeline.geometry.catalogue import CatalogueObject, Material
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.mesh_files import UnitSource
@@ -15,6 +16,7 @@ from schemas.softgrip.v1 import objects_pb2
 
 TOPIC = "/objects"
 REFUSED_TOPIC = "/refused"
+MESH_STORED_AS = {"vertices_m": "f8", "faces": "u4"}
 
 
 def object_message(item: CatalogueObject, split: str) -> objects_pb2.CatalogueObject:
@@ -42,7 +44,14 @@ def object_message(item: CatalogueObject, split: str) -> objects_pb2.CatalogueOb
 
 
 def object_of(message: objects_pb2.CatalogueObject) -> CatalogueObject:
-    """The object of a message."""
+    """The object of a message.
+
+    Raises
+    ------
+    ContentError : it has no such class, or a mesh that is none.
+    """
+    if message.shape_class not in set(ShapeClass):
+        raise ContentError(f"'{message.name}' is of class '{message.shape_class}'")
     return CatalogueObject(
         name=message.name,
         source=message.source,
@@ -68,8 +77,10 @@ def object_of(message: objects_pb2.CatalogueObject) -> CatalogueObject:
 def read_objects(path: Path) -> dict[str, tuple[CatalogueObject, str]]:
     """Name → (object, split) of an objects artifact."""
     with open_artifact(path) as artifact:
-        messages = [m for _, m in artifact.messages(objects_pb2.CatalogueObject)]
-    return {message.name: (object_of(message), message.split) for message in messages}
+        return {
+            message.name: (object_of(message), message.split)
+            for _, message in artifact.messages(objects_pb2.CatalogueObject)
+        }
 
 
 def _mesh_message(mesh: Mesh) -> objects_pb2.TriangleMesh:
@@ -80,4 +91,8 @@ def _mesh_message(mesh: Mesh) -> objects_pb2.TriangleMesh:
 
 
 def _mesh(message: objects_pb2.TriangleMesh) -> Mesh:
-    return Mesh(from_tensor(message.vertices_m), from_tensor(message.faces).astype(np.int64))
+    arrays = tensors_of(message, MESH_STORED_AS, {"vertices_m": "n 3", "faces": "m 3"})
+    vertices, faces = arrays["vertices_m"], arrays["faces"].astype(np.int64)
+    if faces.max(initial=-1) >= len(vertices):
+        raise ContentError("A mesh has faces that refer to vertices it does not have")
+    return Mesh(vertices, faces)

@@ -23,7 +23,7 @@ from pipeline.artifacts.bounds import (
     checked_attachment,
 )
 from pipeline.artifacts.provenance import METADATA_NAME, Provenance
-from pipeline.errors import ArtifactError
+from pipeline.errors import ArtifactError, ContentError
 
 M = TypeVar("M", bound=Message)
 
@@ -173,7 +173,8 @@ def open_artifact(path: Path) -> Iterator[Artifact]:
 
     Raises
     ------
-    ArtifactError : missing, not an MCAP, damaged, or of another version.
+    ArtifactError : missing, not an MCAP, damaged, or of another version; also where what the
+        caller makes of its messages shows that they cannot be used.
     """
     try:
         file = BoundedFile(path)
@@ -186,7 +187,11 @@ def open_artifact(path: Path) -> Iterator[Artifact]:
             f"{path} cannot be read: {error.strerror}", "Mend its access"
         ) from error
     with file:
-        yield Artifact(file)
+        artifact = Artifact(file)
+        try:
+            yield artifact
+        except ContentError as error:
+            raise ArtifactError(f"{path}: {error.what}", error.remedy) from error
 
 
 def read_provenance(path: Path) -> Provenance:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pipeline.artifacts.tensors import from_tensor, to_tensor
+from pipeline.artifacts.tensors import tensors_of, to_tensor
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 
 STORED_AS = {
@@ -16,6 +16,11 @@ STORED_AS = {
     "shape_class": "u1",
     "level": "u1",
     "pressure": "f4",
+}
+SHAPES = {
+    "cloud": "n g g 3",
+    "cloud_mask": "n g g",
+    **dict.fromkeys(("quality", "object_index", "shape_class", "level", "pressure"), "n"),
 }
 
 
@@ -60,7 +65,12 @@ def sample_batch(samples: Samples, object_names: tuple[str, ...]) -> SampleBatch
 
 
 def samples_of(message: SampleBatch) -> Samples:
-    """The samples of a message: views of its bytes."""
-    arrays = {name: from_tensor(getattr(message, name)) for name in STORED_AS}
+    """The samples of a message: views of its bytes.
+
+    Raises
+    ------
+    ContentError : a tensor is missing, or they do not fit together.
+    """
+    arrays = tensors_of(message, STORED_AS, SHAPES)
     arrays["cloud_mask"] = arrays["cloud_mask"].view(bool)
     return Samples(**arrays)

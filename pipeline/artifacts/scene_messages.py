@@ -6,6 +6,7 @@ foxglove.CameraCalibration, and all poses as foxglove.FrameTransforms, so that
 a viewer shows the file as it is.
 """
 
+import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import cast
@@ -23,7 +24,7 @@ from pipeline.artifacts.writing import ArtifactWriter
 from pipeline.clutter.levels import level_of
 from pipeline.clutter.scene import ClutterScene, PlacedObject
 from pipeline.config.cameras import DepthSensor
-from pipeline.errors import ArtifactError
+from pipeline.errors import ArtifactError, ContentError
 from pipeline.geometry.transforms import position_quaternion
 from pipeline.sensing.cameras import PinholeCamera
 from pipeline.sensing.view import CameraView
@@ -152,7 +153,11 @@ def _view(artifact: Artifact, viewpoint: scenes_pb2.Viewpoint, time_ns: int) -> 
                     "Make the scenes again",
                 )
             shape = (raw.height, raw.width) + ((3,) if encoding == "rgb8" else ())
+            if len(raw.data) != math.prod(shape) * np.dtype(dtype).itemsize:
+                raise ContentError(f"{topic} holds {len(raw.data)} bytes, its shape is {shape}")
             images[name] = np.frombuffer(raw.data, dtype).reshape(shape)
+    if missing := [name for name in IMAGES if name not in images and name != "behind"]:
+        raise ContentError(f"Viewpoint '{viewpoint.name}' has no image {', '.join(missing)}")
     return CameraView(
         camera=camera,
         depth_m=images["depth"],

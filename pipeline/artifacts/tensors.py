@@ -1,13 +1,17 @@
 """NumPy arrays in and out of softgrip.v1.Tensor."""
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
+from google.protobuf.message import Message
 
-from pipeline.errors import ArtifactError
+from pipeline.errors import ArtifactError, ContentError
 from schemas.softgrip.v1.tensor_pb2 import Tensor
 
 DTYPES = ("b1", "u1", "u2", "u4", "u8", "i1", "i2", "i4", "i8", "f2", "f4", "f8")
+MOST_SIDES = 8
+LONGEST_SIDE = 2**40  # even of an empty array
 
 
 def to_tensor(array: np.ndarray) -> Tensor:
@@ -31,19 +35,46 @@ def from_tensor(tensor: Tensor) -> np.ndarray:
 
     Raises
     ------
-    ArtifactError : unknown dtype, or the bytes do not fill the declared shape.
+    ContentError : unknown dtype, or the bytes do not fill the declared shape.
     """
     if tensor.dtype not in DTYPES:
-        raise ArtifactError(
-            f"Tensor of unknown dtype '{tensor.dtype}'", "The file is damaged: make it again"
-        )
+        raise ContentError(f"Tensor of unknown dtype '{tensor.dtype}'")
     dtype = np.dtype("<" + tensor.dtype)
     shape = tuple(tensor.shape)
     declared = math.prod(shape) * dtype.itemsize
+    if len(shape) > MOST_SIDES or max(shape, default=0) > LONGEST_SIDE:
+        raise ContentError(f"Tensor of {len(shape)} sides, the longest {max(shape, default=0)}")
     if declared != len(tensor.data):
-        raise ArtifactError(
+        raise ContentError(
             f"Tensor of shape {shape} and dtype {tensor.dtype} declares {declared} bytes "
-            f"and holds {len(tensor.data)}",
-            "The file is damaged: make it again",
+            f"and holds {len(tensor.data)}"
         )
     return np.frombuffer(tensor.data, dtype=dtype).reshape(shape)
+
+
+def tensors_of(
+    message: Message, stored_as: Mapping[str, str], shapes: Mapping[str, str]
+) -> dict[str, np.ndarray]:
+    """Several tensors of a message, each of its dtype and all of shapes that fit together.
+
+    shapes : field → sides such as ``"n g g 3"``; a letter is one length wherever it stands.
+
+    Raises
+    ------
+    ContentError : one has another dtype or shape.
+    """
+    arrays: dict[str, np.ndarray] = {}
+    lengths: dict[str, int] = {}
+    for name, dtype in stored_as.items():
+        array = arrays[name] = from_tensor(getattr(message, name))
+        sides = shapes[name].split()
+        fits = array.ndim == len(sides) and all(
+            length == (int(side) if side.isdigit() else lengths.setdefault(side, length))
+            for side, length in zip(sides, array.shape, strict=True)
+        )
+        if not fits or array.dtype != np.dtype("<" + dtype):
+            raise ContentError(
+                f"Tensor '{name}' is {array.dtype.str[1:]} of shape {array.shape}, "
+                f"expected {dtype} of ({', '.join(sides)}) with {lengths or 'any length'}"
+            )
+    return arrays

@@ -29,12 +29,14 @@ _UNIT_NAMES = {
     **{"millimeters": "mm", "millimeter": "mm", "mm": "mm"},
     **{"inches": "in", "inch": "in", "in": "in"},
 }
-# What a parser may raise on a damaged file, as seen on truncated and bit-flipped files.
+# What a parser may raise on a damaged file, as seen on truncated, bit-flipped and fuzzed files.
 _PARSER_ERRORS = (
     LookupError,
     ValueError,
     TypeError,
     AttributeError,
+    NameError,
+    RecursionError,
     ArithmeticError,
     AssertionError,
     RuntimeError,

@@ -61,6 +61,7 @@ def load_checkpoint_bytes(data: bytes) -> GaCnn:
         )
     try:
         config = NetworkConfig.model_validate_json(metadata.get("network", ""))
+        _check_shapes(config, tensors)
         network = build_network(config, seed=0)
         network.load_state_dict(tensors)
     except (ValidationError, ConfigError, RuntimeError) as error:
@@ -71,6 +72,14 @@ def load_checkpoint_bytes(data: bytes) -> GaCnn:
     if not all(bool(torch.isfinite(tensor).all()) for tensor in tensors.values()):
         raise ArtifactError("network checkpoint holds weights that are not finite", _REMEDY)
     return network.eval()
+
+
+def _check_shapes(config: NetworkConfig, tensors: Mapping[str, Tensor]) -> None:
+    """Hold the weights against the configuration before a network of its size is allocated."""
+    with torch.device("meta"):
+        expected = {name: tensor.shape for name, tensor in GaCnn(config).state_dict().items()}
+    if {name: tensor.shape for name, tensor in tensors.items()} != expected:
+        raise ArtifactError("network checkpoint does not fit its own configuration", _REMEDY)
 
 
 def tensors_to_bytes(tensors: Mapping[str, Tensor], metadata: Mapping[str, str]) -> bytes:

@@ -17,6 +17,10 @@ from onnxruntime.capi.onnxruntime_pybind11_state import (
     InvalidArgument,
     InvalidGraph,
     InvalidProtobuf,
+    RuntimeException,
+)
+from onnxruntime.capi.onnxruntime_pybind11_state import (
+    NotImplemented as OperatorNotImplemented,
 )
 
 from pipeline.errors import ArtifactError
@@ -33,6 +37,10 @@ LARGEST_DIFFERENCE = 1e-4
 _INPUT, _OUTPUT = "inputs", "quality"
 _CELLS = 24
 _REMEDY = "Export the network again."
+_REFUSALS = (
+    *(Fail, InvalidArgument, InvalidGraph, InvalidProtobuf),
+    *(OperatorNotImplemented, RuntimeException),
+)
 
 
 def export_onnx_bytes(network: GaCnn) -> bytes:
@@ -68,9 +76,12 @@ class OnnxPredictor:
         ArtifactError : the bytes are no such export, or of another version.
         """
         try:
-            properties = {p.key: p.value for p in onnx.load_from_string(data).metadata_props}
+            model = onnx.load_from_string(data)
         except DecodeError as error:
             raise ArtifactError(f"exported network is damaged: {error}", _REMEDY) from error
+        if any(weights.data_location != onnx.TensorProto.DEFAULT for weights in _weights(model)):
+            raise ArtifactError("exported network refers to weights in other files", _REMEDY)
+        properties = {p.key: p.value for p in model.metadata_props}
         if properties != _metadata():
             raise ArtifactError(
                 f"exported network is marked {properties}, this program reads {_metadata()}",
@@ -85,7 +96,8 @@ class OnnxPredictor:
             self._session = onnxruntime.InferenceSession(
                 data, options, providers=["CPUExecutionProvider"]
             )
-        except (Fail, InvalidArgument, InvalidGraph, InvalidProtobuf) as error:
+        # Its messages may quote the bytes of a damaged model, which need not be text.
+        except (*_REFUSALS, RuntimeError, UnicodeDecodeError) as error:
             raise ArtifactError(f"exported network cannot be run: {error}", _REMEDY) from error
 
     def predict(
@@ -129,6 +141,15 @@ def checked_against(
             _REMEDY,
         )
     return difference
+
+
+def _weights(model: onnx.ModelProto) -> Iterator[onnx.TensorProto]:
+    """Every stored tensor of a model: initial values and constants."""
+    yield from model.graph.initializer
+    for node in model.graph.node:
+        for attribute in node.attribute:
+            yield attribute.t
+            yield from attribute.tensors
 
 
 def _metadata() -> dict[str, str]:
