@@ -1,4 +1,4 @@
-"""What a soft contact can bear: Eq. (7)-(13), as bounds on GW and on W."""
+"""What a soft contact can bear (S-1.11): Eq. (7)-(13), as bounds on GW and on W."""
 
 import math
 

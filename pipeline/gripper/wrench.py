@@ -1,4 +1,4 @@
-"""The wrench that each contact triangle can exert: Eq. (1), (3)-(7).
+"""The wrench that each contact triangle can exert: Eq. (1), (3)-(7), S-1.09, S-1.10.
 
 Assumption A-3 acts here: of the six components of a wrench the supplement keeps
 F_x, F_y, F_z and T_z; the object's weight and the torques about x and y are left out.

@@ -34,7 +34,7 @@ def blueprint(objects: int, greatest_nsvr: float) -> rrb.Blueprint:
                 rrb.Spatial3DView(
                     origin="/world/object",
                     name="Object (left) and its convex parts",
-                    eye_controls=looking((0.08, -0.2, 0.12), (0.08, 0.0, 0.0)),
+                    eye_controls=looking((0.1, -0.25, 0.15), (0.1, 0.0, 0.0)),
                 ),
                 rrb.TimeSeriesView(
                     origin="/curves/nsvr",

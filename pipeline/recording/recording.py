@@ -35,6 +35,7 @@ TIMELINES = {
     "shards": "sample",
     "train": "epoch",
     "evaluate": "frame",
+    "sweep": "layers",
 }
 
 

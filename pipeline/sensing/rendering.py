@@ -1,4 +1,4 @@
-"""Pictures of a scene: SAPIEN's renderer, or Embree rays where no Vulkan driver is.
+"""Pictures of a scene (S-1.14): SAPIEN's renderer, or Embree rays where no Vulkan driver is.
 
 On one machine and driver equal scenes give equal bits. Between drivers the last bits of depth
 differ, and at silhouettes the body a pixel belongs to: so renderers are compared inside

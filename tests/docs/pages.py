@@ -1,0 +1,36 @@
+"""The project's pages, and the commands in them."""
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = (
+    "README.md",
+    "pipeline/README.md",
+    "runs/README.md",
+    "schemas/README.md",
+    "stages/README.md",
+)
+
+# Commands that the tests run in another form, and why. Every other one runs as it stands, on a
+# run so small that it is already made.
+REDUCED = {
+    "make test": ("make -n test", "these tests are part of it"),
+    "make bench": ("make -n bench", "minutes of measuring; its parts have tests of their own"),
+    "make review RUN=ci STAGE=grasps": (
+        "make -n review RUN=ci STAGE=grasps",
+        "it ends when its viewer is closed; tests/stages/test_review.py opens it",
+    ),
+}
+
+
+def blocks_of(page: str, language: str = "sh") -> list[str]:
+    """The fenced blocks of a page in a language."""
+    text = (ROOT / page).read_text()
+    return re.findall(rf"^```{language}\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
+
+
+def as_run(block: str) -> str:
+    """A block as the tests run it."""
+    lines = (line.partition("  #")[0].rstrip() for line in block.splitlines())
+    return "\n".join(REDUCED[line][0] if line in REDUCED else line for line in lines)
