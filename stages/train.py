@@ -227,6 +227,7 @@ def summary(
         "device": chosen_device(stage.config.train.device, ranks).type,
         "processes": ranks.count,
         "waiting_for_data_share": trained.waiting_share,
+        "preparing_inputs_share": trained.preparing_share,
         "inference_ms_a_grasp": inference,
     }
 

@@ -109,7 +109,7 @@ class Waiting:
             asked = time.perf_counter()
             self.working_s += asked - given
 
-    def share(self) -> float | None:
-        """Waiting over all time; None before the first item."""
+    def share_of(self, seconds: float) -> float | None:
+        """So many seconds over all time, waiting and working; None before the first item."""
         total = self.waiting_s + self.working_s
-        return self.waiting_s / total if total else None
+        return seconds / total if total else None

@@ -14,7 +14,7 @@ import json
 import math
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,6 +31,7 @@ from pipeline.execution.progress import progress
 from pipeline.network.canonical import SYMMETRIES, apply_symmetry, network_input
 from pipeline.network.ga_cnn import GaCnn, build_network
 from pipeline.network.loading import (
+    RawBatch,
     Waiting,
     batch_count,
     epoch_batches,
@@ -65,8 +66,9 @@ class TrainedNetwork:
     val_mae : that error.
     history : every epoch, those before an interruption too.
     stopped_early : patience ran out before the last epoch.
-    waiting_share : share of this call's steps that was spent waiting for batches; None where no
-        step was left to take.
+    waiting_share, preparing_share : shares of this call's steps that were spent waiting for
+        samples to be read, and making canonical inputs of them; None where no step was left to
+        take.
     """
 
     network: GaCnn
@@ -75,6 +77,7 @@ class TrainedNetwork:
     history: tuple[EpochMetrics, ...]
     stopped_early: bool
     waiting_share: float | None
+    preparing_share: float | None
 
 
 def train(
@@ -125,14 +128,15 @@ def train(
 
         batches_per_epoch = batch_count(len(train_set), config.batch_size)
         total_steps = config.epochs * batches_per_epoch
-        waiting, saved_at = Waiting(), time.monotonic()
+        reading, preparing, saved_at = Waiting(), Waiting(), time.monotonic()
         while not _finished(standing.history, config):
             epoch = len(standing.history)
             rng = np.random.default_rng((seed, epoch))
             batches = epoch_batches(len(train_set), config.batch_size, rng)
             symmetry = rng.integers(0, SYMMETRIES, len(train_set)) if config.augment else None
             mine = part_of_rank(batches, ranks.rank, ranks.count)[standing.batch :]
-            ready = waiting.watch(ready_batches(train_set, mine, symmetry, device, loader_workers))
+            loaded = load_batches(train_set, mine, loader_workers, pinned=device.type == "cuda")
+            ready = preparing.watch(ready_batches(reading.watch(loaded), symmetry, device))
             if show_progress and ranks.first:
                 name = f"train: epoch {epoch + 1} of {config.epochs}"
                 ready = iter(progress(ready, len(mine), name, "batch"))
@@ -190,24 +194,19 @@ def train(
         val_mae=best.val_mae,
         history=tuple(standing.history),
         stopped_early=len(standing.history) < config.epochs,
-        waiting_share=waiting.share(),
+        waiting_share=preparing.share_of(reading.waiting_s),
+        preparing_share=preparing.share_of(preparing.waiting_s - reading.waiting_s),
     )
 
 
 def ready_batches(
-    samples: GraspTensors,
-    batches: list[Int[np.ndarray, " b"]],
-    symmetry: Int[np.ndarray, " n"] | None,
-    device: torch.device,
-    loader_workers: int,
+    loaded: Iterable[RawBatch], symmetry: Int[np.ndarray, " n"] | None, device: torch.device
 ) -> Iterator[Batch]:
     """Canonical inputs and qualities on the device, batch by batch.
 
     symmetry : for each sample of the set the element that turns or mirrors it.
     """
-    for indices, cloud, mask, quality in load_batches(
-        samples, batches, loader_workers, pinned=device.type == "cuda"
-    ):
+    for indices, cloud, mask, quality in loaded:
         inputs = network_input(
             cloud.to(device, non_blocking=True), mask.to(device, non_blocking=True)
         )
@@ -281,7 +280,8 @@ def _mean_absolute_error(
     error_sum = torch.zeros(1, dtype=torch.float64, device=device)
     model.eval()
     with torch.inference_mode():
-        for inputs, quality in ready_batches(samples, batches, None, device, loader_workers=0):
+        loaded = load_batches(samples, batches, workers=0, pinned=False)
+        for inputs, quality in ready_batches(loaded, None, device):
             with mixed_precision(device):
                 predicted = model(inputs)
             error_sum += (predicted - quality).abs().sum()

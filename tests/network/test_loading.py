@@ -68,8 +68,8 @@ def test_batches_too_small_to_divide_are_refused() -> None:
 
 def test_waiting_counts_the_time_before_each_item() -> None:
     waiting = Waiting()
-    assert waiting.share() is None
+    assert waiting.share_of(1.0) is None
     assert list(waiting.watch(range(3))) == [0, 1, 2]
     assert waiting.waiting_s > 0
     assert waiting.working_s > 0
-    assert 0 < (waiting.share() or 0) < 1
+    assert 0 < (waiting.share_of(waiting.waiting_s) or 0) < 1

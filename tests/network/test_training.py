@@ -119,7 +119,9 @@ def test_every_sample_is_seen_once_an_epoch(tmp_path: Path, few: GraspTensors) -
     trained = short_training(few, tmp_path, seed=1, kill_after=None)
     assert [metrics.samples for metrics in trained.history] == [len(few)] * 3
     assert trained.waiting_share is not None
-    assert 0 < trained.waiting_share < 1
+    assert trained.preparing_share is not None
+    assert 0 < trained.waiting_share < 0.5
+    assert 0 < trained.preparing_share < 1 - trained.waiting_share
 
 
 def test_state_of_other_arguments_is_not_continued(tmp_path: Path, few: GraspTensors) -> None:
