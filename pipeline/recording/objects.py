@@ -5,14 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-from jaxtyping import Float
 
 from pipeline.geometry.catalogue import CatalogueObject
-from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.shape import COMPLEX_FROM, TYPICAL_FROM
 from pipeline.recording import colours
 from pipeline.recording.recording import looking, name_curve, numbered, step, time_panel
-from pipeline.recording.shapes import shown_mesh
+from pipeline.recording.shapes import shown_facets, shown_mesh
 
 TIMELINE = "object"
 SPACING_M = 0.22
@@ -75,13 +73,13 @@ def show_catalogue(
     for index, (item, split) in enumerate(sorted(items, key=lambda pair: pair[0].nsvr)):
         place = SPACING_M * np.array([index % columns, -(index // columns), 0.0])
         colour = colours.SHAPE_CLASS[item.shape_class]
+        path = f"world/catalogue/{item.name}"
+        stream.log(path, shown_mesh(item.mesh, colour), static=True)
+        stream.log(path, rr.Transform3D(translation=place), static=True)
         stream.log(
-            f"world/catalogue/{item.name}", shown_mesh(moved(item.mesh, place), colour), static=True
-        )
-        stream.log(
-            f"world/catalogue/{item.name}/label",
+            f"{path}/label",
             rr.Points3D(
-                [place + np.array([0.0, 0.0, 0.7 * item.mesh.extents_m[2]])],
+                [[0.0, 0.0, 0.7 * item.mesh.extents_m[2]]],
                 labels=[f"{item.name} {item.nsvr:.2f}"],
                 radii=0.0005,
                 colors=colours.PALETTE[7],
@@ -95,12 +93,10 @@ def show_catalogue(
 
 def _show_object(stream: rr.RecordingStream, path: str, item: CatalogueObject, split: str) -> None:
     stream.log(f"{path}/mesh", shown_mesh(item.mesh, colours.SHAPE_CLASS[item.shape_class]))
-    beside = np.array([1.3 * item.mesh.extents_m[0] + 0.02, 0.0, 0.0])
+    beside = [1.3 * item.mesh.extents_m[0] + 0.02, 0.0, 0.0]
+    stream.log(f"{path}/parts", rr.Transform3D(translation=beside))
     for number, part in enumerate(item.convex_parts):
-        stream.log(
-            f"{path}/parts/{number}",
-            shown_mesh(moved(part, beside), colours.by_index(number)),
-        )
+        stream.log(f"{path}/parts/{number}", shown_facets(part, colours.by_index(number)))
     stream.log(f"curves/nsvr/{item.shape_class}", rr.Scalars(item.nsvr))
     repairs = "; ".join(item.repairs) or "none: closed as it came"
     stream.log(
@@ -121,8 +117,3 @@ def _show_object(stream: rr.RecordingStream, path: str, item: CatalogueObject, s
 
 def _columns(objects: int) -> int:
     return int(np.ceil(np.sqrt(objects)))
-
-
-def moved(mesh: Mesh, offset_m: Float[np.ndarray, " 3"]) -> Mesh:
-    """The mesh elsewhere, so that things stand side by side."""
-    return Mesh(mesh.vertices_m + offset_m, mesh.faces)

@@ -27,6 +27,18 @@ def shown_mesh(mesh: Mesh, colour: UInt8[np.ndarray, " 3"]) -> rr.Mesh3D:
     )
 
 
+def shown_facets(mesh: Mesh, colour: UInt8[np.ndarray, " 3"]) -> rr.Mesh3D:
+    """A small mesh in one colour with every face flat, as a convex part is."""
+    corners = mesh.vertices_m[mesh.faces]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
+    return rr.Mesh3D(
+        vertex_positions=corners.reshape(-1, 3),
+        vertex_normals=np.repeat(normals, 3, axis=0),
+        albedo_factor=[*colour.tolist(), 255],
+    )
+
+
 @lru_cache(maxsize=256)
 def _shaded(mesh: Mesh) -> Mesh:
     """Simplified where it must be, with the vertices of its edges doubled."""
