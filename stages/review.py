@@ -12,7 +12,7 @@ from loguru import logger
 
 from pipeline.errors import ArtifactError, SoftgripError
 from pipeline.execution import RunFolder
-from stages.graph import RUNS_DIR, STAGES
+from stages.graph import MADE, RUNS_DIR
 
 WEB_PORT = 9090
 LOCAL = "127.0.0.1"  # the viewer would otherwise listen to the whole network
@@ -25,9 +25,9 @@ def recordings_of(folder: RunFolder, stage: str | None) -> list[Path]:
     ------
     ArtifactError : the stage is unknown, or nothing was recorded yet.
     """
-    if stage is not None and stage not in STAGES:
-        raise ArtifactError(f"There is no stage '{stage}'", f"Stages are {', '.join(STAGES)}")
-    wanted = [stage] if stage else list(STAGES)
+    if stage is not None and stage not in MADE:
+        raise ArtifactError(f"There is no stage '{stage}'", f"Stages are {', '.join(MADE)}")
+    wanted = [stage] if stage else list(MADE)
     found = [path for path in map(folder.recording, wanted) if path.is_file()]
     if not found:
         missing = f"{folder.recording(stage)}" if stage else f"any recording of {folder.path}"

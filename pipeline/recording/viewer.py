@@ -16,6 +16,7 @@ from pipeline.simulation.vulkan import choose_vulkan_driver
 
 _PATIENCE_S = 60.0
 _PAUSE_S = 0.5
+_TRIES = 3  # beyond the first; the viewer gives up on a picture after some seconds
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ def sight_of(recording: Path, step: int | None = None) -> Sight:
         window = _settled(client, recording)
         state = client.get_state()
         views = {
-            view.name or view.origin: client.take_screenshot(view.view_id)
+            view.name or view.origin: _screenshot(client, view.view_id)
             for view in state.views
             if view.visible
         }
@@ -81,7 +82,7 @@ def _settled(client: ViewerClient, recording: Path) -> bytes:
     while time.monotonic() < deadline:
         time.sleep(_PAUSE_S)
         state = client.get_state()
-        window: bytes = client.take_screenshot()
+        window = _screenshot(client)
         if not state.loading and state.active_recording and window == before:
             return window
         before = window
@@ -89,6 +90,16 @@ def _settled(client: ViewerClient, recording: Path) -> bytes:
         f"{recording} did not stand still in the viewer for {_PATIENCE_S:.0f} s",
         "Open it by hand: .venv/bin/rerun with its path",
     )
+
+
+def _screenshot(client: ViewerClient, view_id: str | None = None) -> bytes:
+    """A picture of the window or of a view; a busy machine may need several tries for one."""
+    for _ in range(_TRIES):
+        try:
+            return bytes(client.take_screenshot(view_id))
+        except TimeoutError:
+            time.sleep(_PAUSE_S)
+    return bytes(client.take_screenshot(view_id))
 
 
 def _free_port() -> int:
