@@ -327,12 +327,16 @@ def sized_network(bench: Bench) -> tuple[GaCnn, OnnxPredictor]:
 def control_steps(bench: Bench) -> dict[str, object]:
     """The closed loop's step with the network at its full size; its weights change no time."""
     _, network = sized_network(bench)
-    scene = bench.scenes[-1]
-    depth = disturb(scene.views[0], np.random.default_rng(0))
-    found = control.step_ms(scene, depth, network, bench.config, CONTROL_STEPS)
+    found = control.step_ms(bench.scenes[-1], bench.meshes, network, bench.config, CONTROL_STEPS)
+    rounded = {
+        part: {name: round(value, 2) for name, value in times.items()}
+        for part, times in found.items()
+    }
     return {
-        "control_step_p95_ms": round(found["p95"], 2),
-        "control_step_ms": {name: round(value, 2) for name, value in found.items()},
+        "control_step_p95_ms": rounded["decision"]["p95"],
+        "control_step_ms": rounded["decision"],
+        "control_step_with_picture_ms": rounded["with the picture"],
+        "control_candidates": bench.config.evaluate.policy.local_candidates,
         "control_layers": bench.config.network.layers,
     }
 

@@ -3,40 +3,61 @@
 import numpy as np
 
 from pipeline.artifacts.tensors import to_tensor
+from pipeline.control.cloud import DepthPicture
 from pipeline.control.policy import Cause
-from pipeline.simulation.picking import Attempt
+from pipeline.simulation.picking import Made
 from schemas.softgrip.v1 import evaluation_pb2
 
-ARRAYS = (
-    "world_from_gripper",
-    "reached_pose",
-    "time_s",
-    "gripper_path",
-    "object_paths",
-    "base_wrench",
-)
+PICTURE_EVERY = 4  # pixels a side: a film needs to show what was seen, not to measure it
 
 
 def attempt_message(
-    scene_id: str, level: int, number: int, made: Attempt
+    scene_id: str, level: int, bodies: int, number: int, policy: str, made: Made
 ) -> evaluation_pb2.Attempt:
-    """The message of one attempt."""
+    """The message of one attempt. bodies : of the scene, when it was whole."""
     lifted = made.cause is Cause.LIFTED
-    message = evaluation_pb2.Attempt(
+    decision, samples = made.decision, made.samples
+    gone = np.full((4, 4), np.nan)
+    objects = [[s.world_from_object.get(i, gone) for i in range(1, bodies + 1)] for s in samples]
+    arrays = {
+        "world_from_gripper": decision.world_from_contact,
+        "reached_pose": made.reached_pose,
+        "time_s": np.array([s.time_s for s in samples]),
+        "gripper_path": np.array([s.world_from_gripper for s in samples]).reshape(-1, 4, 4),
+        "object_paths": np.array(objects).reshape(-1, bodies, 4, 4),
+        "base_wrench": np.array([s.wrench for s in samples]).reshape(-1, 6),
+    }
+    return evaluation_pb2.Attempt(
         scene_id=scene_id,
         level=level,
         attempt=number,
         outcome="lifted" if lifted else "failed",
         cause="" if lifted else str(made.cause),
         target=made.target,
-        candidates=made.candidates,
-        predicted_quality=made.predicted_quality,
+        candidates=len(decision.quality),
+        predicted_quality=decision.predicted_quality,
         reached_quality=made.reached_quality,
         seal_pressure=made.seal_pressure,
         lifted_height_m=made.lifted_height_m,
         duration_s=made.duration_s,
-        states=made.states,
+        states=[s.state for s in samples],
+        policy=policy,
+        candidate_poses=to_tensor(decision.candidates.astype(np.float32)),
+        candidate_quality=to_tensor(decision.quality.astype(np.float32)),
+        corrections=decision.corrections,
+        pictures=[picture_message(picture) for picture in decision.pictures],
+        **{name: to_tensor(np.asarray(array, np.float64)) for name, array in arrays.items()},
     )
-    for name in ARRAYS:
-        getattr(message, name).CopyFrom(to_tensor(np.asarray(getattr(made, name), np.float64)))
-    return message
+
+
+def picture_message(picture: DepthPicture) -> evaluation_pb2.DepthPicture:
+    """A thinned depth image."""
+    depth = np.nan_to_num(picture.depth_m[::PICTURE_EVERY, ::PICTURE_EVERY])
+    intrinsics = picture.camera.intrinsics.copy()
+    intrinsics[:2] /= PICTURE_EVERY
+    return evaluation_pb2.DepthPicture(
+        camera=picture.camera.name,
+        depth_mm=to_tensor(np.round(np.clip(1e3 * depth, 0, 65_535)).astype(np.uint16)),
+        intrinsics=to_tensor(intrinsics),
+        world_from_camera=to_tensor(picture.camera.world_from_camera),
+    )

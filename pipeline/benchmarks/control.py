@@ -1,49 +1,61 @@
-"""One control step: candidates near the aim, their sub clouds, and 52 layers' verdict."""
+"""One control step of the local phase: candidates near the aim, their sub clouds, 52 layers."""
 
 import time
 
 import numpy as np
-from jaxtyping import Float
 
 from pipeline.benchmarks.clock import quantiles_ms
 from pipeline.clutter.scene import ClutterScene
 from pipeline.config import RunConfig
-from pipeline.control.candidates import above_table, sample_near
+from pipeline.control.cloud import DepthPicture, merged_cloud
+from pipeline.control.correction import LOOK_M, corrected
+from pipeline.control.ranking import NetworkRanking
+from pipeline.control.viewpoints import gripper_above
+from pipeline.geometry.mesh import Mesh
+from pipeline.geometry.posed_bodies import PosedBodies
 from pipeline.network.export import OnnxPredictor
-from pipeline.sensing.cameras import points_of_depth
-from pipeline.sensing.sub_cloud import sub_clouds
+from pipeline.sensing.cameras import camera_at
+from pipeline.sensing.depth_by_rays import measured_depth, window_around
+from pipeline.simulation.eyes import gripper_from_camera, moved
 
 SCORE_BATCH = 64
-_CLOUD_EVERY = 2
 
 
 def step_ms(
     scene: ClutterScene,
-    depth_m: Float[np.ndarray, "h w"],
+    meshes: dict[str, Mesh],
     network: OnnxPredictor,
     config: RunConfig,
     steps: int,
-) -> dict[str, float]:
-    """p50, p95, p99 of a correction on the way down, rendering aside."""
-    camera = scene.views[0].camera
+) -> dict[str, dict[str, float]]:
+    """p50, p95, p99 of corrections on the way down, with and without making the picture."""
     rng = np.random.default_rng(0)
-    radius_m = config.gripper.pad.radius_m
-    aims = above_table(points_of_depth(depth_m, camera, _CLOUD_EVERY)[0])
-    times = []
+    surfaces = PosedBodies(
+        {p.body_id: meshes[p.object_name] for p in scene.objects}, config.scenes.table_side_m
+    ).at({p.body_id: p.world_from_object for p in scene.objects})
+    ranking = NetworkRanking(
+        lambda cloud, mask: network.predict(cloud, mask, SCORE_BATCH),
+        config.sensing,
+        config.gripper.pad.radius_m,
+        config.evaluate.policy.smoothing_m,
+    )
+    view = scene.views[0]
+    aims = merged_cloud([DepthPicture(view.depth_m, view.camera)]).points_m
+    on_wrist = camera_at("wrist", config.cameras.wrist, np.zeros(3), 1.0, 0.0, 0.0)
+    seen: list[float] = []
+    decided: list[float] = []
     for _ in range(steps):
-        aim = aims[rng.integers(len(aims))]
-        started = time.perf_counter()
-        points = above_table(points_of_depth(depth_m, camera, _CLOUD_EVERY)[0])
-        near = sample_near(
-            points,
-            aim,
-            camera.world_from_camera[:3, 3],
-            config.grasps.normal_radius_m,
-            config.evaluate.policy,
-            rng,
-        )
-        if len(near):
-            cloud, mask = sub_clouds(depth_m, camera, near, config.sensing, radius_m)
-            network.predict(cloud, mask, SCORE_BATCH)
-        times.append(time.perf_counter() - started)
-    return quantiles_ms(times)
+        aim = np.eye(4)
+        aim[:3, 3] = aims[rng.integers(len(aims))]
+        height_m = rng.uniform(0.11, config.evaluate.policy.standoff_m)
+        pose = gripper_above(aim[:3, 3], height_m, np.eye(4))
+        camera = moved(on_wrist, pose @ gripper_from_camera(config.evaluate.hand))
+        times: list[float] = [time.perf_counter()]
+        window = window_around(camera, aim[:3, 3], LOOK_M)
+        picture = DepthPicture(measured_depth(window, surfaces, None, rng), window)
+        times.append(time.perf_counter())
+        corrected(picture, aim, ranking, config.evaluate, config.grasps.normal_radius_m, rng)
+        times.append(time.perf_counter())
+        decided.append(times[2] - times[1])
+        seen.append(times[2] - times[0])
+    return {"decision": quantiles_ms(decided), "with the picture": quantiles_ms(seen)}

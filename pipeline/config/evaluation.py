@@ -7,6 +7,9 @@ from pydantic import Field
 
 from pipeline.config.section import Section
 
+RobotName = Literal["floating", "iiwa14"]
+PolicyName = Literal["closed-loop", "uncorrected", "open-loop", "geometric"]
+
 
 class SuctionConfig(Section):
     """The vacuum and the joint that carries an object."""
@@ -22,38 +25,82 @@ class LiftConfig(Section):
 
     height_m: float = Field(0.10, gt=0, description="lift that counts [m]")
     hold_s: float = Field(1.0, gt=0, description="time the object must stay up [s]")
-    shake_m: float = Field(0.005, ge=0, description="amplitude of the shake while held [m]")
+    shake_m: float = Field(0.005, ge=0, description="amplitude of the shake before that [m]")
     shake_hz: float = Field(2.0, gt=0, description="frequency of the shake [Hz]")
+    shake_s: float = Field(0.5, ge=0, description="time of the shake [s]")
+
+
+class HandConfig(Section):
+    """The gripper's rigid part and the camera on it, in GCS: +z from the pad to the flange."""
+
+    length_m: float = Field(0.20, gt=0.05, le=1, description="pad to flange [m]")
+    stem_radius_m: float = Field(
+        0.012, gt=0, le=0.1, description="of the rigid stem above the pad [m]"
+    )
+    camera_aside_m: float = Field(
+        0.16, ge=0, le=0.5, description="camera off the axis, along x [m]"
+    )
+    camera_above_m: float = Field(0.18, gt=0, le=0.5, description="camera above the pad [m]")
+    camera_focus_m: float = Field(
+        0.15, gt=0, le=2, description="where its axis meets the gripper's, below the pad [m]"
+    )
 
 
 class PolicyConfig(Section):
     """Candidates and the closed loop; Supplement VI."""
 
-    candidates: int = Field(128, ge=1, le=4096, description="u, sub clouds sampled")
+    candidates: int = Field(128, ge=1, le=4096, description="u, sub clouds of the global phase")
+    local_candidates: int = Field(48, ge=1, le=4096, description="u of each step on the way down")
+    wrist_views: int = Field(2, ge=0, le=8, description="looks of the wrist before the choice")
+    wrist_view_m: float = Field(0.28, gt=0.05, le=2, description="pad above what it looks at [m]")
     tilt_max_rad: float = Field(
         math.radians(50), ge=0, lt=math.pi / 2, description="approach off the vertical [rad]"
     )
     rate_hz: float = Field(15.0, gt=0, description="closed-loop rate; Supplement VI: 15 [Hz]")
-    corrections: int = Field(3, ge=0, description="re-observations on the way down")
+    standoff_m: float = Field(0.20, gt=0.02, le=1, description="where the approach begins [m]")
     correction_radius_m: float = Field(
-        0.015, ge=0, description="how far a correction may move the contact [m]"
+        0.015, ge=0, description="how far one correction may move the contact [m]"
     )
-    speed_m_s: float = Field(0.25, gt=0, le=2, description="approach speed [m/s]")
+    correction_gain: float = Field(
+        0.02, ge=0, le=1, description="rise of q-hat that a correction must promise [1]"
+    )
+    smoothing_m: float = Field(
+        0.007, ge=0, description="q-hat is averaged over neighbours this near [m]"
+    )
+    avoid_radius_m: float = Field(
+        0.02, ge=0, description="no second try this near to a failed one [m]"
+    )
+    travel_m_s: float = Field(0.8, gt=0, le=3, description="speed in free space [m/s]")
+    speed_m_s: float = Field(0.25, gt=0, le=2, description="speed of approach and lift [m/s]")
+    acceleration_m_s2: float = Field(3.0, gt=0, le=50, description="of every motion [m/s2]")
     force_limit_n: float = Field(
         15.0, gt=0, description="contact force that stops the approach [N]"
+    )
+    tension_min_n: float = Field(
+        0.02, gt=0, description="least pull on the base that tells a held object [N]"
+    )
+    slip_m: float = Field(
+        0.008, gt=0, description="shift of the load's line in one step that is a slip [m]"
+    )
+    trim_max_rad: float = Field(
+        math.radians(12), ge=0, lt=1, description="most the lift may tilt to lessen moments [rad]"
     )
 
 
 class EvaluateConfig(Section):
     """Closed-loop evaluation on the test clutters."""
 
-    robot: Literal["floating"] = "floating"
+    robot: RobotName = Field("floating", description="a gripper alone, or on a KUKA LBR iiwa 14")
+    policies: tuple[PolicyName, ...] = Field(
+        ("closed-loop", "open-loop", "geometric"), min_length=1, description="the first is judged"
+    )
     attempts_per_clutter: int = Field(
         15, ge=1, description="attempts before a clutter is given up as not cleared"
     )
     failures_per_clutter: int = Field(5, ge=1, description="failures in a row that end a clutter")
     suction: SuctionConfig = SuctionConfig()
     lift: LiftConfig = LiftConfig()
+    hand: HandConfig = HandConfig()
     policy: PolicyConfig = PolicyConfig()
 
 

@@ -4,79 +4,129 @@ Supplement VI: sub point clouds are sampled at random, and the grasp direction o
 average surface normal.
 """
 
-import numpy as np
-from jaxtyping import Float, Int
-from scipy.spatial import cKDTree
+from dataclasses import dataclass
 
-from pipeline.config.evaluation import PolicyConfig
+import numba
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pipeline.control.cloud import Cloud
 from pipeline.gripper.sampling import contact_frames
 
-TABLE_CLEARANCE_M = 0.006  # measured points lower than this may be the table
 _FEWEST_POINTS = 6  # a plane through fewer is no surface
 
 
-def above_table(points_m: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "m 3"]:
-    """Finite points that cannot be the table's."""
-    finite = np.isfinite(points_m).all(axis=1)
-    kept = finite & (np.nan_to_num(points_m[:, 2]) > TABLE_CLEARANCE_M)
-    return np.asarray(points_m[kept])
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Poses to try; arrays of one length k.
+
+    world_from_contact : origin at the contact, +z out along the mean normal.
+    roughness_m : root mean square distance of the points around from their plane.
+    """
+
+    world_from_contact: Float[np.ndarray, "k 4 4"]
+    roughness_m: Float[np.ndarray, " k"]
+
+    def __len__(self) -> int:
+        return len(self.roughness_m)
+
+    def take(self, chosen: Bool[np.ndarray, " k"] | Int[np.ndarray, " j"]) -> "Candidates":
+        """Some of them."""
+        return Candidates(self.world_from_contact[chosen], self.roughness_m[chosen])
 
 
 def sample_candidates(
-    points_m: Float[np.ndarray, "n 3"],
-    eye_m: Float[np.ndarray, " 3"],
-    normal_radius_m: float,
-    config: PolicyConfig,
-    rng: np.random.Generator,
-) -> Float[np.ndarray, "k 4 4"]:
-    """u contacts at random on the cloud, as world_from_contact; fewer where surfaces are too steep.
-
-    points_m : measured points in WCS without the table. eye_m : the camera, to tell outside.
-    """
-    at = rng.integers(len(points_m), size=config.candidates)
-    return candidates_at(points_m, at, eye_m, normal_radius_m, config.tilt_max_rad)
+    cloud: Cloud, count: int, radius_m: float, tilt_max_rad: float, rng: np.random.Generator
+) -> Candidates:
+    """u contacts at random on the cloud; fewer where surfaces are too steep or too small."""
+    at = rng.integers(len(cloud), size=count)
+    return candidates_at(cloud, cloud.points_m[at], cloud.eye_m[at], radius_m, tilt_max_rad)
 
 
 def sample_near(
-    points_m: Float[np.ndarray, "n 3"],
+    cloud: Cloud,
     contact_m: Float[np.ndarray, " 3"],
-    eye_m: Float[np.ndarray, " 3"],
-    normal_radius_m: float,
-    config: PolicyConfig,
+    within_m: float,
+    count: int,
+    radius_m: float,
+    tilt_max_rad: float,
     rng: np.random.Generator,
-) -> Float[np.ndarray, "k 4 4"]:
-    """The same within ``correction_radius_m`` of a contact, for corrections on the way down."""
-    near = np.flatnonzero(
-        np.linalg.norm(points_m - contact_m, axis=1) <= config.correction_radius_m
-    )
+) -> Candidates:
+    """The contact itself, first, and others at random near it, for corrections on the way down."""
+    near = np.flatnonzero(np.linalg.norm(cloud.points_m - contact_m, axis=1) <= within_m)
     if len(near) == 0:
-        return np.empty((0, 4, 4))
-    at = near[rng.integers(len(near), size=min(config.candidates, 4 * len(near)))]
-    return candidates_at(points_m, at, eye_m, normal_radius_m, config.tilt_max_rad)
+        return Candidates(np.empty((0, 4, 4)), np.empty(0))
+    nearest = near[np.argmin(np.linalg.norm(cloud.points_m[near] - contact_m, axis=1))]
+    at = np.concatenate([[nearest], rng.choice(near, size=count - 1)])
+    return candidates_at(cloud, cloud.points_m[at], cloud.eye_m[at], radius_m, tilt_max_rad)
 
 
 def candidates_at(
-    points_m: Float[np.ndarray, "n 3"],
-    at: Int[np.ndarray, " k"],
-    eye_m: Float[np.ndarray, " 3"],
+    cloud: Cloud,
+    contacts_m: Float[np.ndarray, "k 3"],
+    eyes_m: Float[np.ndarray, "k 3"],
     radius_m: float,
     tilt_max_rad: float,
-) -> Float[np.ndarray, "m 4 4"]:
-    """world_from_contact of the chosen points whose mean normal is not too far off the vertical."""
-    near = cKDTree(points_m).query_ball_point(points_m[at], radius_m)
-    frames = []
-    for index, neighbours in zip(at, near, strict=True):
-        if len(neighbours) < _FEWEST_POINTS:
+) -> Candidates:
+    """Frames at the contacts whose mean normal is not too far off the vertical.
+
+    The contact is moved along its normal onto the plane through the points within ``radius_m``:
+    their mean is nearer to the surface than one noisy point.
+    """
+    count, mean, scatter = _neighbourhoods(cloud.points_m, contacts_m, radius_m)
+    enough = count >= _FEWEST_POINTS
+    if not enough.any():
+        return Candidates(np.empty((0, 4, 4)), np.empty(0))
+    contacts, eyes, mean = contacts_m[enough], eyes_m[enough], mean[enough]
+    squared, axes = np.linalg.eigh(scatter[enough])
+    normals = axes[:, :, 0]
+    away = np.einsum("ij,ij->i", normals, eyes - contacts) <= 0
+    normals = np.where(away[:, None], -normals, normals)
+    steep = normals[:, 2] < np.cos(tilt_max_rad)
+    height = np.einsum("ij,ij->i", normals, mean - contacts)
+    frames = contact_frames(contacts + height[:, None] * normals, normals, np.zeros(len(normals)))
+    roughness = np.sqrt(np.maximum(squared[:, 0], 0.0))
+    return Candidates(frames[~steep], roughness[~steep])
+
+
+@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+def _neighbourhoods(
+    points: Float[np.ndarray, "n 3"], at: Float[np.ndarray, "k 3"], radius: float
+) -> tuple[Int[np.ndarray, " k"], Float[np.ndarray, "k 3"], Float[np.ndarray, "k 3 3"]]:
+    """Number, mean and covariance of the points within a radius of each place.
+
+    Every point is looked at: for some thousands that is faster than a tree with its lists.
+    """
+    counts = np.zeros(len(at), dtype=np.int64)
+    means = np.zeros((len(at), 3))
+    scatter = np.zeros((len(at), 3, 3))
+    for i in range(len(at)):
+        squares = np.zeros((3, 3))
+        sums = np.zeros(3)
+        for j in range(len(points)):
+            x = points[j, 0] - at[i, 0]
+            if x > radius or x < -radius:
+                continue
+            y = points[j, 1] - at[i, 1]
+            z = points[j, 2] - at[i, 2]
+            if x * x + y * y + z * z > radius * radius:
+                continue
+            counts[i] += 1
+            sums[0] += x
+            sums[1] += y
+            sums[2] += z
+            squares[0, 0] += x * x
+            squares[0, 1] += x * y
+            squares[0, 2] += x * z
+            squares[1, 1] += y * y
+            squares[1, 2] += y * z
+            squares[2, 2] += z * z
+        if counts[i] == 0:
             continue
-        patch = points_m[neighbours]
-        centred = patch - patch.mean(axis=0)
-        normal = np.linalg.eigh(centred.T @ centred)[1][:, 0]
-        normal = normal if normal @ (eye_m - points_m[index]) > 0 else -normal
-        if normal[2] >= np.cos(tilt_max_rad):
-            # The patch's mean is nearer to the surface than one noisy point.
-            on_plane = points_m[index] + normal * (normal @ (patch.mean(axis=0) - points_m[index]))
-            frames.append((on_plane, normal))
-    if not frames:
-        return np.empty((0, 4, 4))
-    contacts, normals = (np.array(part) for part in zip(*frames, strict=True))
-    return contact_frames(contacts, normals, np.zeros(len(contacts)))
+        sums /= counts[i]
+        means[i] = at[i] + sums
+        for row in range(3):
+            for column in range(row, 3):
+                value = squares[row, column] / counts[i] - sums[row] * sums[column]
+                scatter[i, row, column] = scatter[i, column, row] = value
+    return counts, means, scatter

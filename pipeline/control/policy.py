@@ -1,173 +1,303 @@
 """One attempt, from the first look to the lifted object or the cause why not.
 
-The policy looks, scores u candidates in one batch, goes above the best, looks again on the way
-down and corrects the contact (Supplement VI), seals, lifts, shakes. What it needs of the world
-is in the three protocols; each way to end has a name.
+Global phase: clouds of several viewpoints are merged, u candidates sampled and ranked in one
+batch; those the robot cannot reach or that would collide are left out. Local phase: the wrist's
+camera looks again at every control step, and the contact is corrected, until the camera is too
+near; then straight on until contact. After that the wrench leads (Supplement VI). What is needed
+of the world is in `pipeline.control.robot`; each way to end has a name.
 """
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Protocol
 
 import numpy as np
 from jaxtyping import Float
 
-from pipeline.config.evaluation import EvaluateConfig
-from pipeline.control.candidates import above_table, sample_candidates, sample_near
+from pipeline.config.evaluation import EvaluateConfig, PolicyName
+from pipeline.control.candidates import Candidates, sample_candidates
+from pipeline.control.clearance import free_of_collision
+from pipeline.control.cloud import Cloud, DepthPicture, merged_cloud
+from pipeline.control.correction import LOOK_M, corrected
+from pipeline.control.ranking import Ranking
+from pipeline.control.robot import Eyes, Reading, Robot, State
+from pipeline.control.viewpoints import best_apart, facing, gripper_above
+from pipeline.control.wrench_monitor import Event, WrenchMonitor, trimmed
 
-PREGRASP_M = 0.10  # above the contact, along the approach
+_SEARCH_M = 0.06  # past the expected contact the pad goes on at most this far
 _RETREAT_M = 0.05
-
-
-class State(StrEnum):
-    """Where an attempt is."""
-
-    OBSERVE = "observe"
-    PREGRASP = "pregrasp"
-    APPROACH = "approach"
-    SEAL = "seal"
-    LIFT = "lift"
-    SHAKE = "shake"
-    DONE = "done"
+_TUG_M = 0.01  # the first bit of the lift, in which a seal shows its pull
+_TRIM_FROM_M = 0.03  # clear of the neighbours
 
 
 class Cause(StrEnum):
     """Why an attempt ended; LIFTED is the good one."""
 
     LIFTED = "lifted"
+    CAMERA_STOPPED = "camera stopped"
     EMPTY_CLOUD = "empty cloud"
     NO_CANDIDATE = "no candidate"
+    UNREACHABLE = "unreachable"
     COLLISION = "collision"
+    NO_CONTACT = "no contact"
     NO_SEAL = "no seal"
     LOST_IN_LIFT = "lost in lift"
     LOST_IN_SHAKE = "lost in shake"
+    OFF_THE_TABLE = "object off the table"
 
 
 @dataclass(frozen=True)
-class Observation:
-    """Measured points in WCS, the camera's place, and a way to score grasps on the picture."""
+class Strategy:
+    """How attempts are made.
 
-    points_m: Float[np.ndarray, "n 3"]
-    eye_m: Float[np.ndarray, " 3"]
-    depth_m: Float[np.ndarray, "h w"]
+    several_views : whether the wrist looks before the choice. corrects : whether it looks again
+    on the way down. trims : whether the lift lessens moments.
+    """
 
-
-class Sensor(Protocol):
-    """Looks at the scene as it is now."""
-
-    def look(self) -> Observation: ...
-
-
-class Scorer(Protocol):
-    """q-hat of every candidate, in one batch."""
-
-    def __call__(
-        self, observation: Observation, world_from_contact: Float[np.ndarray, "k 4 4"], /
-    ) -> Float[np.ndarray, " k"]: ...
+    name: PolicyName
+    ranking: Ranking
+    several_views: bool
+    corrects: bool
+    trims: bool
 
 
-class Robot(Protocol):
-    """Moves the gripper and switches the vacuum."""
-
-    def enter(self, state: State) -> None: ...
-
-    def move(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> bool:
-        """Straight there; False where a collision stopped it."""
-        ...
-
-    def seal(self) -> bool:
-        """Lower the pad until it touches and switch the vacuum on; whether it holds something."""
-        ...
-
-    def lift(self) -> bool:
-        """Up; whether the object is still held at the top."""
-        ...
-
-    def shake(self) -> bool:
-        """Shake and hold; whether the object is still held."""
-        ...
-
-
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Decision:
-    """How an attempt went, as far as the policy knows."""
+    """How an attempt went, as far as the policy knows; filled in as it goes."""
 
-    cause: Cause
-    candidates: int
-    predicted_quality: float
-    world_from_contact: Float[np.ndarray, "4 4"]
-
-
-def attempt(
-    sensor: Sensor,
-    robot: Robot,
-    score: Scorer,
-    config: EvaluateConfig,
-    normal_radius_m: float,
-    rng: np.random.Generator,
-) -> Decision:
-    """Try once."""
-    policy = config.policy
-    robot.enter(State.OBSERVE)
-    seen = sensor.look()
-    points = above_table(seen.points_m)
-    if len(points) == 0:
-        return Decision(Cause.EMPTY_CLOUD, 0, 0.0, np.eye(4))
-    candidates = sample_candidates(points, seen.eye_m, normal_radius_m, policy, rng)
-    if len(candidates) == 0:
-        return Decision(Cause.NO_CANDIDATE, 0, 0.0, np.eye(4))
-    quality = score(seen, candidates)
-    best = int(np.argmax(quality))
-    pose, predicted = candidates[best], float(quality[best])
-
-    robot.enter(State.PREGRASP)
-    count = len(candidates)
-    if not robot.move(backed_off(pose, PREGRASP_M)):
-        return Decision(Cause.COLLISION, count, predicted, pose)
-
-    robot.enter(State.APPROACH)
-    for step in range(policy.corrections):
-        pose, predicted = corrected(sensor, score, pose, predicted, config, normal_radius_m, rng)
-        left = PREGRASP_M * (1.0 - (step + 1) / (policy.corrections + 1))
-        if not robot.move(backed_off(pose, left)):
-            return Decision(Cause.COLLISION, count, predicted, pose)
-
-    robot.enter(State.SEAL)
-    cause = Cause.LIFTED
-    if not robot.seal():
-        cause = Cause.NO_SEAL
-        robot.move(backed_off(pose, _RETREAT_M))
-    else:
-        robot.enter(State.LIFT)
-        if not robot.lift():
-            cause = Cause.LOST_IN_LIFT
-        else:
-            robot.enter(State.SHAKE)
-            cause = Cause.LIFTED if robot.shake() else Cause.LOST_IN_SHAKE
-    robot.enter(State.DONE)
-    return Decision(cause, count, predicted, pose)
+    cause: Cause = Cause.EMPTY_CLOUD
+    candidates: Float[np.ndarray, "k 4 4"] = field(default_factory=lambda: np.empty((0, 4, 4)))
+    quality: Float[np.ndarray, " k"] = field(default_factory=lambda: np.empty(0))
+    predicted_quality: float = 0.0
+    world_from_contact: Float[np.ndarray, "4 4"] = field(default_factory=lambda: np.eye(4))
+    corrections: int = 0
+    pictures: list[DepthPicture] = field(default_factory=list)
 
 
-def corrected(
-    sensor: Sensor,
-    score: Scorer,
-    pose: Float[np.ndarray, "4 4"],
-    predicted: float,
-    config: EvaluateConfig,
-    normal_radius_m: float,
-    rng: np.random.Generator,
-) -> tuple[Float[np.ndarray, "4 4"], float]:
-    """Look again and take the best contact near the one aimed at; its pose and q-hat."""
-    seen = sensor.look()
-    points = above_table(seen.points_m)
-    if len(points) == 0:
-        return pose, predicted
-    near = sample_near(points, pose[:3, 3], seen.eye_m, normal_radius_m, config.policy, rng)
-    if len(near) == 0:
-        return pose, predicted
-    quality = score(seen, near)
-    best = int(np.argmax(quality))
-    return near[best], float(quality[best])
+class Attempt:
+    """One try: `run` goes through the phases, each of which ends well (None) or with a cause."""
+
+    def __init__(
+        self,
+        eyes: Eyes,
+        robot: Robot,
+        strategy: Strategy,
+        config: EvaluateConfig,
+        normal_radius_m: float,
+        rng: np.random.Generator,
+        avoid_m: Sequence[Float[np.ndarray, " 3"]] = (),
+    ) -> None:
+        """avoid_m : contacts that failed before, not to be tried again."""
+        self._eyes = eyes
+        self._robot = robot
+        self._strategy = strategy
+        self._config = config
+        self._policy = config.policy
+        self._normal_radius_m = normal_radius_m
+        self._rng = rng
+        self._avoid_m = avoid_m
+        self._monitor = WrenchMonitor(config.policy)
+        self.decision = Decision()
+
+    def run(self) -> Decision:
+        """Try once."""
+        cause = None
+        for state, phase in (
+            (State.OBSERVE, self._choose),
+            (State.PREGRASP, self._go_above),
+            (State.APPROACH, self._approach),
+            (State.SEAL, self._seal),
+            (State.LIFT, self._lift),
+            (State.SHAKE, self._shake),
+        ):
+            self._robot.enter(state)
+            cause = phase()
+            if cause is not None:
+                break
+        self._robot.enter(State.DONE)
+        self.decision.cause = cause or Cause.LIFTED
+        return self.decision
+
+    def _choose(self) -> Cause | None:
+        """The global phase: look from several viewpoints, then take the best that can be had."""
+        pictures = self._eyes.static()
+        if pictures is None:
+            return Cause.CAMERA_STOPPED
+        cloud = merged_cloud(pictures)
+        if len(cloud) == 0:
+            return Cause.EMPTY_CLOUD
+        if self._strategy.several_views:
+            more = self._look_closer(pictures, cloud)
+            if isinstance(more, Cause):
+                return more
+            pictures = [*pictures, *more]
+            cloud = merged_cloud(pictures)
+        self.decision.pictures = pictures
+        found = self._unspoilt(self._sampled(cloud))
+        if len(found) == 0:
+            return Cause.NO_CANDIDATE
+        quality = self._strategy.ranking(pictures, found)
+        self.decision.candidates, self.decision.quality = found.world_from_contact, quality
+        poses = found.world_from_contact
+        free = free_of_collision(poses, cloud.points_m, self._config.hand)
+        if not free.any():
+            return Cause.NO_CANDIDATE
+        for index in np.argsort(-quality, kind="stable"):
+            if free[index] and self._can_reach(facing(poses[index], self._robot.pose())):
+                self._aim(poses[index], quality[index])
+                return None
+        return Cause.UNREACHABLE
+
+    def _look_closer(
+        self, pictures: Sequence[DepthPicture], cloud: Cloud
+    ) -> list[DepthPicture] | Cause:
+        """Pictures of the wrist's camera above the most promising places."""
+        found = self._unspoilt(self._sampled(cloud))
+        if len(found) == 0:
+            return []
+        quality = self._strategy.ranking(pictures, found)
+        places = found.world_from_contact[:, :3, 3]
+        more = []
+        for place in best_apart(places, quality, self._policy.wrist_views):
+            pose = gripper_above(place, self._policy.wrist_view_m, self._robot.pose())
+            if not self._robot.reachable(pose):
+                continue
+            if self._travel(pose) is not None:
+                continue  # something is in the way: look from where others are
+            picture = self._eyes.wrist(place, self._policy.wrist_view_m / 2)
+            if picture is None:
+                return Cause.CAMERA_STOPPED
+            more.append(picture)
+        return more
+
+    def _go_above(self) -> Cause | None:
+        return self._travel(backed_off(self.decision.world_from_contact, self._policy.standoff_m))
+
+    def _approach(self) -> Cause | None:
+        """The local phase: look, correct, step; until the pad touches."""
+        while True:
+            aim = self.decision.world_from_contact
+            here = self._robot.pose()
+            if self._strategy.corrects and self._sees(aim, here):
+                cause = self._correct()
+                if cause is not None:
+                    return cause
+                aim = self.decision.world_from_contact
+            reading = self._robot.step(backed_off(aim, -_SEARCH_M), self._policy.speed_m_s)
+            event = self._monitor.moving(reading)
+            if event is Event.COLLISION:
+                self._travel(backed_off(self._robot.pose(), _RETREAT_M))
+                return Cause.COLLISION
+            if event is Event.CONTACT:
+                return None
+            if reading.arrived:
+                self._travel(backed_off(self._robot.pose(), _RETREAT_M + _SEARCH_M))
+                return Cause.NO_CONTACT
+
+    def _sees(self, aim: Float[np.ndarray, "4 4"], here: Float[np.ndarray, "4 4"]) -> bool:
+        """Whether the aim is not too near for the wrist's camera."""
+        camera = self._eyes.wrist_camera(here)
+        distance = np.linalg.norm(aim[:3, 3] - camera.world_from_camera[:3, 3])
+        return bool(distance >= camera.near_m + self._policy.correction_radius_m)
+
+    def _correct(self) -> Cause | None:
+        """Look again and take the best contact near the one aimed at, where it promises more."""
+        aim = self.decision.world_from_contact
+        picture = self._eyes.wrist(aim[:3, 3], LOOK_M)
+        if picture is None:
+            return Cause.CAMERA_STOPPED
+        found = corrected(
+            picture,
+            aim,
+            self._strategy.ranking,
+            self._config,
+            self._normal_radius_m,
+            self._rng,
+        )
+        if found is not None:
+            self._aim(*found)
+            self.decision.corrections += 1
+        return None
+
+    def _seal(self) -> Cause | None:
+        """Vacuum on, and the first bit of the lift: a held object pulls."""
+        self._robot.vacuum(on=True)
+        start = self._robot.pose()
+        reading = self._raise(start, _TUG_M)
+        if not self._monitor.holds(reading):
+            self._robot.vacuum(on=False)
+            self._travel(backed_off(start, _RETREAT_M))
+            return Cause.NO_SEAL
+        return None
+
+    def _lift(self) -> Cause | None:
+        """Up, trimming the pose to lessen moments at the base; slower after a slip."""
+        start = self._robot.pose()
+        height, speed = 1.3 * self._config.lift.height_m, self._policy.speed_m_s
+        left = self._policy.trim_max_rad if self._strategy.trims else 0.0
+        reading = None
+        while True:
+            target = self._robot.pose()
+            risen = target[2, 3] - start[2, 3]
+            if reading is not None and left > 0 and risen >= _TRIM_FROM_M:
+                target, turned = trimmed(target, reading.wrench, left)
+                left -= turned
+            target[:2, 3], target[2, 3] = start[:2, 3], start[2, 3] + height
+            reading = self._robot.step(target, speed)
+            event = self._monitor.carrying(reading)
+            if event is Event.LOSS:
+                self._robot.vacuum(on=False)
+                return Cause.LOST_IN_LIFT
+            if event is Event.SLIP:
+                speed = self._policy.speed_m_s / 2
+            if reading.arrived:
+                return None
+
+    def _shake(self) -> Cause | None:
+        reading = self._robot.shake()
+        return None if self._monitor.holds(reading) else Cause.LOST_IN_SHAKE
+
+    def _travel(self, pose: Float[np.ndarray, "4 4"]) -> Cause | None:
+        """Through free space to a pose."""
+        while True:
+            reading = self._robot.step(pose, self._policy.travel_m_s)
+            if self._monitor.moving(reading) is not Event.NOTHING:
+                return Cause.COLLISION
+            if reading.arrived:
+                return None
+
+    def _raise(self, start: Float[np.ndarray, "4 4"], height_m: float) -> Reading:
+        target = start.copy()
+        target[2, 3] += height_m
+        while True:
+            reading = self._robot.step(target, self._policy.speed_m_s)
+            if reading.arrived:
+                return reading
+
+    def _sampled(self, cloud: Cloud) -> Candidates:
+        return sample_candidates(
+            cloud,
+            self._policy.candidates,
+            self._normal_radius_m,
+            self._policy.tilt_max_rad,
+            self._rng,
+        )
+
+    def _unspoilt(self, found: Candidates) -> Candidates:
+        """Without those too near to a contact that failed before."""
+        keep = np.ones(len(found), dtype=bool)
+        for contact in self._avoid_m:
+            distance = np.linalg.norm(found.world_from_contact[:, :3, 3] - contact, axis=1)
+            keep &= distance > self._policy.avoid_radius_m
+        return found.take(keep)
+
+    def _can_reach(self, contact: Float[np.ndarray, "4 4"]) -> bool:
+        above = backed_off(contact, self._policy.standoff_m)
+        return self._robot.reachable(above) and self._robot.reachable(contact)
+
+    def _aim(self, pose: Float[np.ndarray, "4 4"], quality: float) -> None:
+        self.decision.world_from_contact = facing(pose, self._robot.pose())
+        self.decision.predicted_quality = float(quality)
 
 
 def backed_off(

@@ -1,14 +1,33 @@
 """The surface under a pad: one ray down the approach from each of its vertices (S-1.07)."""
 
+from typing import Protocol
+
 import numpy as np
 from jaxtyping import Float, Int
 
-from pipeline.geometry.raycasting import RayScene
 from pipeline.gripper.pad import Pad
 
 
+class Hits(Protocol):
+    """First hit of each ray; body -1 and distance inf where nothing is hit."""
+
+    @property
+    def distance_m(self) -> Float[np.ndarray, " n"]: ...
+
+    @property
+    def body(self) -> Int[np.ndarray, " n"]: ...
+
+
+class Rays(Protocol):
+    """Surfaces that rays can be cast at."""
+
+    def cast(
+        self, origins_m: Float[np.ndarray, "n 3"], directions: Float[np.ndarray, "n 3"], /
+    ) -> Hits: ...
+
+
 def pad_heights(
-    world_from_contact: Float[np.ndarray, "n 4 4"], rays: RayScene, pad: Pad, clearance_m: float
+    world_from_contact: Float[np.ndarray, "n 4 4"], rays: Rays, pad: Pad, clearance_m: float
 ) -> tuple[Float[np.ndarray, "n v"], Int[np.ndarray, "n v"]]:
     """z_s(v): height of the scene under each pad vertex above the frame's origin, and its body.
 

@@ -1,4 +1,7 @@
-"""evaluate.rrd: a film of the attempts, failures first, with their wrench and what was decided."""
+"""evaluate.rrd: a film of the attempts, worst failure first: scene, gripper, what was seen, felt.
+
+The worst failure is the one that promised most: the highest q-hat among those that did not lift.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -11,26 +14,42 @@ from pipeline.geometry.mesh import Mesh
 from pipeline.recording import colours
 from pipeline.recording.recording import looking, name_curve, numbered, step, time_panel
 from pipeline.recording.shapes import shown_mesh, shown_pose
-from schemas.softgrip.v1.evaluation_pb2 import Attempt
+from schemas.softgrip.v1.evaluation_pb2 import Attempt, DepthPicture
 
 TIMELINE = "frame"
 PAD_RADIUS_M = 0.025
+STEM_RADIUS_M = 0.012
+STEM_M = 0.165
+SHOWN_CANDIDATES = 60  # the best of them: more hide the scene
+APPROACH_M = 0.025
+CAMERAS = ("static_0", "wrist")
+STATES = ("observe", "pregrasp", "approach", "seal", "lift", "shake", "done")
 
 
 def blueprint() -> rrb.Blueprint:
-    """Opens on the first failure."""
+    """Opens on the worst failure."""
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Spatial3DView(
                 origin="/world",
-                name="Scene, pad and its path",
-                eye_controls=looking((-0.6, -0.6, 0.5), (0.0, 0.0, 0.08)),
+                name="Scene, gripper and its path, candidates by q-hat",
+                eye_controls=looking((-0.55, -0.55, 0.5), (0.0, 0.0, 0.08)),
             ),
             rrb.Vertical(
                 rrb.TextDocumentView(origin="/notes/attempt", name="Attempt"),
-                rrb.TimeSeriesView(origin="/curves/force", name="load on the pad in N"),
-                rrb.TimeSeriesView(origin="/curves/moment", name="moment on the pad in N m"),
-                rrb.TextDocumentView(origin="/notes/result", name="Success by level"),
+                rrb.Horizontal(
+                    *(
+                        rrb.Spatial2DView(origin=f"/camera/{name}", name=f"depth, {name}")
+                        for name in CAMERAS
+                    )
+                ),
+                rrb.TimeSeriesView(origin="/curves/force", name="force at the base in N"),
+                rrb.TimeSeriesView(origin="/curves/moment", name="moment at the base in N m"),
+                rrb.Tabs(
+                    rrb.TimeSeriesView(origin="/curves/state", name="State of the policy"),
+                    rrb.TextDocumentView(origin="/notes/result", name="Success"),
+                ),
+                row_shares=[2, 3, 2, 2, 2],
             ),
             column_shares=[3, 2],
         ),
@@ -54,15 +73,17 @@ def show_attempts(
         for axis, hue in (("x", 5), ("y", 2), ("z", 1)):
             curve, label = f"curves/{quantity}/{axis}", f"{axis} in {unit}"
             name_curve(stream, curve, label, colours.PALETTE[hue])
+    name_curve(stream, "curves/state", ", ".join(STATES), colours.PALETTE[4])
+    _show_gripper(stream)
     frame = 0
-    films = sorted(attempts, key=lambda a: (a.outcome == "lifted", a.scene_id, a.attempt))
-    for number, made in enumerate(films):
+    for number, made in enumerate(worst_first(attempts)):
         step(stream, TIMELINE, frame)
         objects = numbered(stream, "world/objects", number)
         for index, name in enumerate(names[made.scene_id]):
             colour = colours.by_index(index + 1)
             stream.log(f"{objects}/{index + 1:02d}", shown_mesh(meshes[name], colour))
-        stream.log("notes/attempt", rr.TextDocument(_facts(made)))
+        stream.log("notes/attempt", rr.TextDocument(_facts(made), media_type=rr.MediaType.MARKDOWN))
+        _show_choice(stream, made)
         path, bodies = from_tensor(made.gripper_path), from_tensor(made.object_paths)
         wrench = from_tensor(made.base_wrench)
         if len(path):
@@ -70,7 +91,75 @@ def show_attempts(
         for index in range(len(path)):
             step(stream, TIMELINE, frame)
             frame += 1
+            stream.log("curves/state", rr.Scalars(STATES.index(made.states[index])))
             _show_frame(stream, objects, path[index], bodies[index], wrench[index])
+
+
+def worst_first(attempts: Sequence[Attempt]) -> list[Attempt]:
+    """Failures by falling q-hat, then the others in their order."""
+    return sorted(
+        attempts,
+        key=lambda a: (
+            a.outcome == "lifted",
+            0.0 if a.outcome == "lifted" else -a.predicted_quality,
+            a.scene_id,
+            a.policy,
+            a.attempt,
+        ),
+    )
+
+
+def _show_gripper(stream: rr.RecordingStream) -> None:
+    """Pad and stem, in GCS; their pose is logged frame by frame."""
+    stream.log(
+        "world/gripper/pad",
+        rr.Cylinders3D(
+            lengths=[0.004], radii=[PAD_RADIUS_M], colors=[colours.PALETTE[6]], fill_mode="solid"
+        ),
+        static=True,
+    )
+    stream.log(
+        "world/gripper/stem",
+        rr.Cylinders3D(
+            lengths=[STEM_M],
+            radii=[STEM_RADIUS_M],
+            centers=[[0.0, 0.0, 0.035 + STEM_M / 2]],
+            colors=[colours.PALETTE[7]],
+            fill_mode="solid",
+        ),
+        static=True,
+    )
+
+
+def _show_choice(stream: rr.RecordingStream, made: Attempt) -> None:
+    """Candidates as arrows coloured by q-hat, the pose chosen, and the pictures behind it."""
+    poses, quality = from_tensor(made.candidate_poses), from_tensor(made.candidate_quality)
+    best = np.argsort(-quality, kind="stable")[:SHOWN_CANDIDATES]
+    stream.log(
+        "world/candidates",
+        rr.Arrows3D(
+            origins=poses[best, :3, 3] + APPROACH_M * poses[best, :3, 2],
+            vectors=-APPROACH_M * poses[best, :3, 2],
+            colors=colours.by_value(quality[best]),
+            radii=0.0008,
+        ),
+    )
+    chosen = from_tensor(made.world_from_gripper)
+    stream.log("world/chosen", shown_pose(chosen))
+    stream.log("world/chosen", rr.TransformAxes3D(0.05))
+    for camera in CAMERAS:
+        pictures = [p for p in made.pictures if p.camera == camera]
+        if pictures:
+            _show_picture(stream, f"camera/{camera}", pictures[-1])
+        else:
+            stream.log(f"camera/{camera}", rr.Clear(recursive=True))
+
+
+def _show_picture(stream: rr.RecordingStream, path: str, picture: DepthPicture) -> None:
+    depth = from_tensor(picture.depth_mm)
+    seen = depth[depth > 0]
+    reach = (float(seen.min()), float(seen.max())) if seen.size else (0.0, 1.0)
+    stream.log(path, rr.DepthImage(depth, meter=1000.0, depth_range=reach, colormap="viridis"))
 
 
 def _show_frame(
@@ -86,13 +175,7 @@ def _show_frame(
             stream.log(path, shown_pose(body))
         else:
             stream.log(path, rr.Clear(recursive=True))
-    stream.log(
-        "world/pad",
-        rr.Cylinders3D(
-            lengths=[0.004], radii=[PAD_RADIUS_M], colors=[colours.PALETTE[6]], fill_mode="solid"
-        ),
-    )
-    stream.log("world/pad", shown_pose(pose))
+    stream.log("world/gripper", shown_pose(pose))
     for name, value in zip(("x", "y", "z"), wrench[:3], strict=True):
         stream.log(f"curves/force/{name}", rr.Scalars(value))
     for name, value in zip(("x", "y", "z"), wrench[3:], strict=True):
@@ -101,9 +184,10 @@ def _show_frame(
 
 def _facts(made: Attempt) -> str:
     return (
-        f"{made.scene_id}, attempt {made.attempt}: {made.outcome} {made.cause}\n\n"
-        f"target {made.target or 'none'}, {made.candidates} candidates, "
-        f"predicted q {made.predicted_quality:.3f}\n\n"
-        f"reached q {made.reached_quality:.3f}, p {made.seal_pressure:.3f}, "
-        f"lifted {1e3 * made.lifted_height_m:.0f} mm"
+        f"**{made.policy}: {made.outcome}{': ' + made.cause if made.cause else ''}** "
+        f"({made.scene_id}, attempt {made.attempt})\n\n"
+        f"target {made.target or 'none'}; {made.candidates} candidates, "
+        f"{made.corrections} corrections; predicted q {made.predicted_quality:.3f}, "
+        f"reached q {made.reached_quality:.3f}, p {made.seal_pressure:.3f}; "
+        f"lifted {1e3 * made.lifted_height_m:.0f} mm in {made.duration_s:.1f} s\n"
     )

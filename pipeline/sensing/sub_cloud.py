@@ -6,6 +6,8 @@ Points farther than ``grid_depth_m`` from the contact along z are left out: the 
 reach them (H = 30 mm) and they would only blur the cell's mean.
 """
 
+from collections.abc import Sequence
+
 import numba
 import numpy as np
 from jaxtyping import Bool, Float
@@ -23,38 +25,46 @@ def sub_clouds(
     radius_m: float,
 ) -> tuple[Float[np.ndarray, "b g g 3"], Bool[np.ndarray, "b g g"]]:
     """Clouds in units of r_G (``radius_m``) and the cells that hold a measured point."""
+    return merged_sub_clouds([(depth_m, camera)], world_from_contact, config, radius_m)
+
+
+def merged_sub_clouds(
+    pictures: Sequence[tuple[Float[np.ndarray, "h w"], PinholeCamera]],
+    world_from_contact: Float[np.ndarray, "b 4 4"],
+    config: SensingConfig,
+    radius_m: float,
+) -> tuple[Float[np.ndarray, "b g g 3"], Bool[np.ndarray, "b g g"]]:
+    """The same from the points of several depth images together (Supplement VI)."""
     count, cells = len(world_from_contact), config.grid_cells
-    camera_from_contact = invert(camera.world_from_camera) @ world_from_contact
+    sums = np.zeros((count, cells, cells, 4))
+    for depth_m, camera in pictures:
+        _add(
+            np.ascontiguousarray(depth_m, dtype=np.float64),
+            camera.intrinsics,
+            np.ascontiguousarray(invert(camera.world_from_camera) @ world_from_contact),
+            config.grid_side_m,
+            config.grid_depth_m,
+            sums,
+        )
     cloud = np.zeros((count, cells, cells, 3), dtype=np.float32)
     seen = np.zeros((count, cells, cells), dtype=np.bool_)
-    _fill(
-        np.ascontiguousarray(depth_m, dtype=np.float64),
-        camera.intrinsics,
-        np.ascontiguousarray(camera_from_contact),
-        config.grid_side_m,
-        config.grid_depth_m,
-        radius_m,
-        cloud,
-        seen,
-    )
+    _means(sums, radius_m, cloud, seen)
     return cloud, seen
 
 
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]
-def _fill(
+def _add(
     depth: Float[np.ndarray, "h w"],
     k: Float[np.ndarray, "3 3"],
     camera_from_contact: Float[np.ndarray, "b 4 4"],
     side: float,
     reach: float,
-    radius: float,
-    cloud: Float[np.ndarray, "b g g 3"],
-    seen: Bool[np.ndarray, "b g g"],
+    sums: Float[np.ndarray, "b g g 4"],
 ) -> None:
+    """Add the points of one depth image, and their number, to their cells' sums."""
     height, width = depth.shape
-    cells = cloud.shape[1]
+    cells = sums.shape[1]
     half = side / 2
-    sums = np.empty((cells, cells, 4))
     for b in range(len(camera_from_contact)):
         pose = camera_from_contact[b]
         # The window that the box's eight corners project into.
@@ -76,7 +86,6 @@ def _fill(
             top, bottom = min(top, row), max(bottom, row)
         if behind:
             left, right, top, bottom = 0, width - 1, 0, height - 1
-        sums[:] = 0.0
         for row in range(max(top, 0), min(bottom, height - 1) + 1):
             for column in range(max(left, 0), min(right, width - 1) + 1):
                 z = depth[row, column]
@@ -93,13 +102,24 @@ def _fill(
                 i = int(np.floor((gy + half) / side * cells))
                 j = int(np.floor((gx + half) / side * cells))
                 if 0 <= i < cells and 0 <= j < cells:
-                    sums[i, j, 0] += gx
-                    sums[i, j, 1] += gy
-                    sums[i, j, 2] += gz
-                    sums[i, j, 3] += 1.0
+                    sums[b, i, j, 0] += gx
+                    sums[b, i, j, 1] += gy
+                    sums[b, i, j, 2] += gz
+                    sums[b, i, j, 3] += 1.0
+
+
+@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+def _means(
+    sums: Float[np.ndarray, "b g g 4"],
+    radius: float,
+    cloud: Float[np.ndarray, "b g g 3"],
+    seen: Bool[np.ndarray, "b g g"],
+) -> None:
+    count, cells = sums.shape[:2]
+    for b in range(count):
         for i in range(cells):
             for j in range(cells):
-                if sums[i, j, 3] > 0.0:
+                if sums[b, i, j, 3] > 0.0:
                     seen[b, i, j] = True
                     for axis in range(3):
-                        cloud[b, i, j, axis] = sums[i, j, axis] / sums[i, j, 3] / radius
+                        cloud[b, i, j, axis] = sums[b, i, j, axis] / sums[b, i, j, 3] / radius

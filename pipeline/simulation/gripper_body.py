@@ -1,276 +1,268 @@
-"""A floating suction gripper: moves in straight lines, seals, carries, and loses what is too heavy.
+"""The suction gripper in SAPIEN: moves a control step at a time, feels, seals, carries, loses.
 
-The stem is a kinematic capsule that pushes what it meets; the soft pad below it is out of
-collision, for it drapes. A sealed object hangs on a compliant joint, a damped spring between
-pad and object whose force is known exactly, and which breaks over the limits of the seal.
+The rigid stem pushes what it meets; the soft pad below it is out of collision, for it drapes: it
+stops where it first touches the true surfaces, at the pose really reached.
 """
 
-from collections.abc import Callable
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 import sapien
 from jaxtyping import Float
-from scipy.spatial.transform import Rotation
 
 from pipeline.config import RunConfig
-from pipeline.control.policy import State
+from pipeline.control.robot import Reading, State
 from pipeline.geometry.catalogue import CatalogueObject
-from pipeline.geometry.raycasting import RayScene
-from pipeline.geometry.table import table_mesh
-from pipeline.geometry.transforms import invert
+from pipeline.geometry.compiled_poses import turn_between, turned
+from pipeline.geometry.posed_bodies import PosedBodies, PosedScene
 from pipeline.gripper import label_batch
 from pipeline.gripper.heights import pad_heights
 from pipeline.gripper.pad import Pad
-from pipeline.simulation.engine import Body, roll_freely, sapien_pose
-from pipeline.simulation.suction import Holding, breaks, holding
+from pipeline.simulation.engine import Body
+from pipeline.simulation.floating import Mover
+from pipeline.simulation.suction import Holding, holding
+from pipeline.simulation.suction_joint import SuctionJoint
 
-_STEM_RADIUS_M = 0.012
-_STEM_HALF_M = 0.05
-_STEM_ABOVE_M = 0.035  # the stem ends this far above the pad: H and a little
-_JOINT_RATE_1_S = 40.0  # natural frequency of the suction joint; critically damped
-_PARKED = np.array([0.0, 0.0, 0.6])
-_GRAVITY = np.array([0.0, 0.0, -9.81])
-_SEARCH_M = 0.06  # the pad goes down at most this far to its first touch
-_SAMPLE_EVERY = 12  # physics steps between two samples of the trajectory
+_TOUCH_N = 2.0  # what the pad's spring pushes with when it touches
+_ARRIVED_M, _ARRIVED_RAD = 1e-4, 1e-3
+_LEVER_M = 0.2  # a turn counts as the way of a point this far from the axis
 
 
-class FloatingGripper:
-    """`pipeline.control.policy.Robot` in SAPIEN, without an arm."""
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """Things as they stood at the end of a control step. wrench : at the base, in GCS."""
+
+    time_s: float
+    world_from_gripper: Float[np.ndarray, "4 4"]
+    world_from_object: dict[int, Float[np.ndarray, "4 4"]]
+    wrench: Float[np.ndarray, " 6"]
+    state: str
+
+
+class SuctionGripper:
+    """`pipeline.control.robot.Robot` in SAPIEN, on whatever moves it."""
 
     def __init__(
         self,
         world: sapien.Scene,
         bodies: dict[int, Body],
-        objects: dict[int, CatalogueObject],
+        objects: Mapping[int, CatalogueObject],
         pad: Pad,
         config: RunConfig,
+        mover: Mover,
     ) -> None:
+        """bodies : those in the world; whoever takes one out of it takes it out here too."""
         self._world = world
         self._bodies = bodies
         self._objects = objects
         self._pad = pad
         self._config = config
-        self._entity, self._rigid = _stem(world)
-        self._limits: Holding | None = None
-        self._grip: tuple[Body, Float[np.ndarray, "4 4"]] | None = None
-        self._state = State.OBSERVE
-        self._load = np.zeros(6)
+        self._mover = mover
+        self._surfaces = PosedBodies(
+            {i: item.mesh for i, item in objects.items()}, config.scenes.table_side_m
+        )
+        self._joint: SuctionJoint | None = None
+        self._steps = max(1, round(1 / config.evaluate.policy.rate_hz / world.timestep))
         self.begin()
 
     def begin(self) -> None:
-        """Park above the table and forget the last attempt."""
-        parked = np.eye(4)
-        parked[:3, 3] = _PARKED
-        self._pose = parked
-        self._entity.pose = sapien_pose(self._stem_pose())
-        self._let_go()
-        self.target: int = 0
-        self.reached_quality = self.seal_pressure = self.lifted_height_m = 0.0
+        """Home, and forget the last attempt."""
+        self.vacuum(on=False)
+        self._mover.reset()
+        self._goal = self._mover.pose()
+        self._speed_m_s = 0.0
+        self._state = State.OBSERVE
+        self.target = 0
+        self.reached_quality = self.seal_pressure = 0.0
         self.reached_pose = np.eye(4)
         self.time_s = 0.0
-        self.samples: list[tuple[float, np.ndarray, dict[int, np.ndarray], np.ndarray, str]] = []
-        self._steps = 0
-        self._state = State.OBSERVE
-        self._load = np.zeros(6)
-        self._sample()
+        self.samples: list[Sample] = []
+        self._sample(np.zeros(6))
 
     def enter(self, state: State) -> None:
         """Name what is being done, for the record."""
         self._state = state
 
-    def move(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> bool:
-        """Straight there, turning on the way; False where the stem met too much force."""
-        distance = float(np.linalg.norm(world_from_gripper[:3, 3] - self._pose[:3, 3]))
-        return self._follow(_line(self._pose, world_from_gripper), distance, self._uncollided)
+    def pose(self) -> Float[np.ndarray, "4 4"]:
+        """world_from_gripper now."""
+        return self._mover.pose()
 
-    def seal(self) -> bool:
-        """Down to first touch on the true surfaces, then vacuum on: sealed if p is enough."""
-        rays, ids = self._surfaces()
-        heights, below = pad_heights(self._pose[None], rays, self._pad, self._reach())
-        heights, below = heights[0], below[0]
-        touch = float(heights.max())
-        if touch < -_SEARCH_M:
-            return False
-        sent = self._pose.copy()
-        sent[:3, 3] += touch * sent[:3, 2]
-        if not self.move(sent):
-            return False
-        self.reached_pose = self._pose.copy()
-        rays, ids = self._surfaces()
-        at_height, at_below = pad_heights(self._pose[None], rays, self._pad, self._reach())
-        on = ids[at_below[0]]
+    def reachable(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> bool:
+        """Whether what moves the gripper can be there."""
+        return self._mover.reachable(world_from_gripper)
+
+    def step(self, world_from_gripper: Float[np.ndarray, "4 4"], speed_m_s: float) -> Reading:
+        """One control period straight towards a pose; the pad stops where it touches."""
+        target, touches = self._stopped_by_touch(world_from_gripper, speed_m_s)
+        loads, peak_n = [], 0.0
+        for _ in range(self._steps):
+            self._advance(target, speed_m_s)
+            load, push_n = self._physics_step()
+            loads.append(load)
+            peak_n = max(peak_n, push_n)
+        touched = touches and self._at(target)
+        if touched:
+            self._speed_m_s = 0.0
+        return self._reading(np.mean(loads, axis=0), peak_n, self._at(world_from_gripper), touched)
+
+    def vacuum(self, on: bool) -> None:
+        """Off lets go. On seals what is under the pad, on the true surfaces, if p is enough."""
+        if not on:
+            if self._joint is not None:
+                self._joint.open()
+            self._joint = None
+            return
+        self.reached_pose = pose = self.pose()
+        heights, below = pad_heights(pose[None], self.surfaces(), self._pad, self._reach_m())
         best = Holding(0.0, 0.0, 0.0, 0.0, 0.0)
-        for body_id in (int(i) for i in np.unique(on[(at_below[0] >= 0) & (on > 0)])):
-            on_target = (on == body_id) & (at_below[0] >= 0)
+        for body_id in (int(i) for i in np.unique(below[below > 0])):
+            on_target = below == body_id
             found = holding(
                 self._pad,
-                at_height[0],
-                on_target,
+                heights[0],
+                on_target[0],
                 self._config.gripper,
                 self._config.evaluate.suction,
             )
             if found.pressure > best.pressure:
                 best, self.target = found, body_id
-                label = label_batch(self._pad, self._config.gripper, at_height, on_target[None])
+                label = label_batch(self._pad, self._config.gripper, heights, on_target)
                 self.reached_quality = float(label.q[0])
         self.seal_pressure = best.pressure
-        if best.pressure < self._config.evaluate.suction.seal_min or self.target == 0:
-            return False
-        body = self._bodies[self.target]
-        self._limits = best
-        self._grip = (body, invert(self._pose) @ body.world_from_object)
-        self._lifted_from = float(body.world_from_object[2, 3])
-        roll_freely(body, free=True)
-        body.rigid.wake_up()
-        return True
+        if self.target and best.pressure >= self._config.evaluate.suction.seal_min:
+            body, item = self._bodies[self.target], self._objects[self.target]
+            self._joint = SuctionJoint.closed(body, item, best, pose)
 
-    def lift(self) -> bool:
-        """Up by the height that counts and a little more; whether the object came along."""
+    def shake(self) -> Reading:
+        """Side to side, then still; the wrench is the mean while still."""
         lift = self._config.evaluate.lift
-        up = self._pose.copy()
-        up[2, 3] += 1.3 * lift.height_m
-        self._follow(_line(self._pose, up), 1.3 * lift.height_m, self._holding_on)
-        return self._is_up()
-
-    def shake(self) -> bool:
-        """Side to side while holding; whether the object is still up afterwards."""
-        lift = self._config.evaluate.lift
-        centre = self._pose.copy()
-        steps = int(np.ceil(lift.hold_s / self._world.timestep))
-        for number in range(1, steps + 1):
-            pose = centre.copy()
+        centre = self._goal.copy()
+        for number in range(1, round(lift.shake_s / self._world.timestep) + 1):
             phase = 2 * np.pi * lift.shake_hz * number * self._world.timestep
-            pose[0, 3] += lift.shake_m * np.sin(phase)
-            self._step(pose)
-        return self._is_up()
+            self._goal = centre.copy()
+            self._goal[0, 3] += lift.shake_m * np.sin(phase)
+            load, _ = self._physics_step()
+            if number % self._steps == 0:
+                self._sample(self._at_base(load))
+        self._goal, loads = centre, []
+        for number in range(1, round(lift.hold_s / self._world.timestep) + 1):
+            loads.append(self._physics_step()[0])
+            if number % self._steps == 0:
+                self._sample(self._at_base(loads[-1]))
+        return self._reading(np.mean(loads[-self._steps :], axis=0), 0.0, True, touched=False)
 
-    def _is_up(self) -> bool:
-        if self._grip is None:
-            return False
-        height = float(self._grip[0].world_from_object[2, 3]) - self._lifted_from
-        self.lifted_height_m = height
-        return height >= self._config.evaluate.lift.height_m
+    def lifted_m(self) -> float:
+        """How far the held object is up; 0 where none is held."""
+        return self._joint.risen_m() if self._joint is not None else 0.0
 
-    def _follow(
-        self,
-        path: Callable[[float], Float[np.ndarray, "4 4"]],
-        distance_m: float,
-        goes_on: Callable[[], bool],
-    ) -> bool:
-        speed = self._config.evaluate.policy.speed_m_s
-        steps = max(1, int(np.ceil(distance_m / speed / self._world.timestep)))
-        for number in range(1, steps + 1):
-            self._step(path(number / steps))
-            if not goes_on():
-                return False
-        return True
+    def settle(self, longest_s: float) -> None:
+        """Let what was dropped or pushed come to rest, the gripper being home."""
+        scenes = self._config.scenes
+        for number in range(round(longest_s / self._world.timestep)):
+            self._world.step()
+            if number % self._steps == 0 and all(
+                body.linear_speed_m_s < scenes.settle_linear_m_s
+                and body.angular_speed_rad_s < scenes.settle_angular_rad_s
+                for body in self._bodies.values()
+            ):
+                return
 
-    def _step(self, pose: Float[np.ndarray, "4 4"]) -> None:
-        self._pose = pose
-        self._rigid.kinematic_target = sapien_pose(self._stem_pose())
-        self._carry()
+    def surfaces(self) -> PosedScene:
+        """The true surfaces where they are now."""
+        return self._surfaces.at({i: b.world_from_object for i, b in self._bodies.items()})
+
+    def _stopped_by_touch(
+        self, target: Float[np.ndarray, "4 4"], speed_m_s: float
+    ) -> tuple[Float[np.ndarray, "4 4"], bool]:
+        """The target, or the place on the way there where the pad touches first in this period."""
+        goal = self._goal
+        way = target[:3, 3] - goal[:3, 3]
+        down_m = -float(way @ goal[:3, 2])
+        if self._joint is not None or down_m <= 0.0:
+            return target, False
+        heights, _ = pad_heights(goal[None], self.surfaces(), self._pad, self._reach_m())
+        gap_m = max(-float(heights.max()), 0.0)
+        if gap_m > min(down_m, speed_m_s * self._steps * self._world.timestep):
+            return target, False
+        share = gap_m / down_m
+        stop = goal.copy()
+        stop[:3, 3] += share * way
+        return stop, True
+
+    def _advance(self, target: Float[np.ndarray, "4 4"], speed_m_s: float) -> None:
+        """Move the goal one physics step: faster, slower and round within the bounds."""
+        way = target[:3, 3] - self._goal[:3, 3]
+        turn = turn_between(self._goal, target)
+        left = max(float(np.linalg.norm(way)), _LEVER_M * float(np.linalg.norm(turn)))
+        if left < 1e-9:
+            self._speed_m_s = 0.0
+            return
+        acceleration, dt = self._config.evaluate.policy.acceleration_m_s2, self._world.timestep
+        self._speed_m_s = min(
+            self._speed_m_s + acceleration * dt, speed_m_s, float(np.sqrt(2 * acceleration * left))
+        )
+        share = min(self._speed_m_s * dt / left, 1.0)
+        self._goal = turned(self._goal, share * turn)
+        self._goal[:3, 3] += share * way
+
+    def _physics_step(self) -> tuple[Float[np.ndarray, " 6"], float]:
+        """One step of the world; the load on the pad in GCS, and the push on rigid parts [N]."""
+        self._mover.drive(self._goal)
+        load = np.zeros(6)
+        if self._joint is not None:
+            load, holds = self._joint.carry(self.pose())
+            if not holds:
+                self._joint.open()
+                self._joint = None
         self._world.step()
         self.time_s += self._world.timestep
-        if self._steps % _SAMPLE_EVERY == 0:
-            self._sample()
-        self._steps += 1
+        push = self._push_on_rigid_parts()
+        if push is None:
+            return load, 0.0
+        into_gripper = self.pose()[:3, :3].T
+        load[:3] += into_gripper @ push[:3]
+        load[3:] += into_gripper @ push[3:]
+        return load, float(np.linalg.norm(push[:3]))
 
-    def _sample(self) -> None:
+    def _push_on_rigid_parts(self) -> Float[np.ndarray, " 6"] | None:
+        """Contact force, and its moment about the pad's centre, in WCS; None without contact."""
+        total, centre = None, self.pose()[:3, 3]
+        for contact in self._world.get_contacts():
+            first, second = (self._mover.owns(body.entity) for body in contact.bodies)
+            if first == second:
+                continue
+            total = np.zeros(6) if total is None else total
+            sign = 1.0 if first else -1.0
+            for point in contact.points:
+                force = sign * np.asarray(point.impulse, dtype=np.float64) / self._world.timestep
+                total[:3] += force
+                total[3:] += np.cross(np.asarray(point.position) - centre, force)
+        return total
+
+    def _reading(
+        self, load: Float[np.ndarray, " 6"], peak_n: float, arrived: bool, touched: bool
+    ) -> Reading:
+        if touched:
+            load = load + np.array([0.0, 0.0, _TOUCH_N, 0.0, 0.0, 0.0])
+        wrench = self._at_base(load)
+        self._sample(wrench)
+        return Reading(self.pose(), wrench, peak_n, arrived)
+
+    def _at_base(self, load: Float[np.ndarray, " 6"]) -> Float[np.ndarray, " 6"]:
+        """A load at the pad's centre as the flange feels it."""
+        pad_from_base = np.array([0.0, 0.0, -self._config.evaluate.hand.length_m])
+        return np.concatenate([load[:3], load[3:] + np.cross(pad_from_base, load[:3])])
+
+    def _at(self, target: Float[np.ndarray, "4 4"]) -> bool:
+        way = float(np.linalg.norm(target[:3, 3] - self._goal[:3, 3]))
+        turn = float(np.linalg.norm(turn_between(self._goal, target)))
+        return way <= _ARRIVED_M and turn <= _ARRIVED_RAD
+
+    def _sample(self, wrench: Float[np.ndarray, " 6"]) -> None:
         """Add things as they stand to the trajectory."""
         poses = {i: body.world_from_object for i, body in self._bodies.items()}
-        self.samples.append(
-            (self.time_s, self._pose.copy(), poses, self._load.copy(), str(self._state))
-        )
+        self.samples.append(Sample(self.time_s, self.pose(), poses, wrench, str(self._state)))
 
-    def _carry(self) -> None:
-        """The joint's force on the object, and on the pad; it breaks over the limits."""
-        self._load = np.zeros(6)
-        if self._grip is None or self._limits is None:
-            return
-        body, gripper_from_object = self._grip
-        item = self._objects[body.body_id]
-        now, wanted = body.world_from_object, self._pose @ gripper_from_object
-        error = wanted[:3, 3] - now[:3, 3]
-        turn = Rotation.from_matrix(wanted[:3, :3] @ now[:3, :3].T).as_rotvec()
-        stiff, damp = _JOINT_RATE_1_S**2, 2 * _JOINT_RATE_1_S
-        linear = np.asarray(body.rigid.linear_velocity, dtype=np.float64)
-        angular = np.asarray(body.rigid.angular_velocity, dtype=np.float64)
-        force = item.mass_kg * (stiff * error - damp * linear - _GRAVITY)
-        inertia = now[:3, :3] @ item.inertia_kg_m2 @ now[:3, :3].T
-        torque = inertia @ (stiff * turn - damp * angular)
-        arm = now[:3, 3] - self._pose[:3, 3]
-        into_gripper = self._pose[:3, :3].T
-        # What the object does to the pad is the opposite of what the joint does to the object.
-        self._load = -np.concatenate(
-            [into_gripper @ force, into_gripper @ (torque + np.cross(arm, force))]
-        )
-        if breaks(self._limits, self._load):
-            self._let_go()
-            return
-        body.rigid.add_force_torque(force, torque)
-
-    def _let_go(self) -> None:
-        if self._grip is not None:
-            roll_freely(self._grip[0], free=False)
-        self._grip = self._limits = None
-
-    def _uncollided(self) -> bool:
-        """Whether the stem meets less force than the limit; what it holds does not count."""
-        limit_n = self._config.evaluate.policy.force_limit_n
-        impulse = 0.0
-        for contact in self._world.get_contacts():
-            if any(body.entity == self._entity for body in contact.bodies):
-                impulse += sum(float(np.linalg.norm(point.impulse)) for point in contact.points)
-        return bool(impulse / self._world.timestep <= limit_n)
-
-    def _holding_on(self) -> bool:
-        return self._grip is not None
-
-    def _stem_pose(self) -> Float[np.ndarray, "4 4"]:
-        """The capsule's centre, above the pad along its axis; a capsule lies along its x."""
-        pose = self._pose.copy()
-        pose[:3, 3] += (_STEM_ABOVE_M + _STEM_RADIUS_M + _STEM_HALF_M) * pose[:3, 2]
-        pose[:3, :3] = pose[:3, :3] @ _Z_FROM_X
-        return pose
-
-    def _surfaces(self) -> tuple[RayScene, np.ndarray]:
-        """The true surfaces where they are now, the table last, and their body ids."""
-        ids = sorted(self._bodies)
-        meshes = [self._objects[i].mesh.transformed(self._bodies[i].world_from_object) for i in ids]
-        table = table_mesh(self._config.scenes.table_side_m)
-        return RayScene([*meshes, table]), np.array([*ids, 0])
-
-    def _reach(self) -> float:
+    def _reach_m(self) -> float:
         return self._config.grasps.clearance_m
-
-
-_Z_FROM_X = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
-
-
-def _stem(
-    world: sapien.Scene,
-) -> tuple[sapien.Entity, sapien.physx.PhysxRigidDynamicComponent]:
-    rigid = sapien.physx.PhysxRigidDynamicComponent()
-    material = sapien.physx.PhysxMaterial(0.3, 0.3, 0.0)
-    rigid.attach(sapien.physx.PhysxCollisionShapeCapsule(_STEM_RADIUS_M, _STEM_HALF_M, material))
-    rigid.kinematic = True
-    entity = sapien.Entity()
-    entity.name = "gripper"
-    entity.add_component(rigid)
-    world.add_entity(entity)
-    return entity, rigid
-
-
-def _line(
-    start: Float[np.ndarray, "4 4"], end: Float[np.ndarray, "4 4"]
-) -> Callable[[float], Float[np.ndarray, "4 4"]]:
-    """The pose a share of the way along, turning evenly."""
-    turn = Rotation.from_matrix(end[:3, :3] @ start[:3, :3].T).as_rotvec()
-
-    def at(share: float) -> Float[np.ndarray, "4 4"]:
-        pose = np.eye(4)
-        pose[:3, :3] = Rotation.from_rotvec(share * turn).as_matrix() @ start[:3, :3]
-        pose[:3, 3] = start[:3, 3] + share * (end[:3, 3] - start[:3, 3])
-        return pose
-
-    return at

@@ -1,73 +1,50 @@
 """The policy against fakes: every way to end has its cause, and it aims where quality is."""
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from pipeline.config import EvaluateConfig
-from pipeline.control.candidates import candidates_at
-from pipeline.control.policy import Cause, Observation, State, attempt
+from pipeline.control.candidates import Candidates
+from pipeline.control.cloud import DepthPicture
+from pipeline.control.policy import Attempt, Cause, Decision, Strategy
+from pipeline.control.robot import State
+from tests.control.fakes import FakeEyes, FakeRobot
 
 CONFIG = EvaluateConfig()
 RADIUS_M = 0.01
-EYE = np.array([0.0, 0.0, 0.9])
+TOP_M = 0.05
 
 
-def plate(height_m: float = 0.05) -> np.ndarray:
+def plate(height_m: float = TOP_M) -> np.ndarray:
     """A level plate, 100 mm a side."""
-    x, y = np.meshgrid(np.linspace(-0.05, 0.05, 41), np.linspace(-0.05, 0.05, 41))
+    x, y = np.meshgrid(np.linspace(-0.05, 0.05, 161), np.linspace(-0.05, 0.05, 161))
     return np.column_stack([x.ravel(), y.ravel(), np.full(x.size, height_m)])
 
 
-class FakeSensor:
-    def __init__(self, points: np.ndarray) -> None:
-        self.points = points
-        self.looks = 0
-
-    def look(self) -> Observation:
-        self.looks += 1
-        return Observation(self.points, EYE, np.zeros((2, 2)))
-
-
-class FakeRobot:
-    """Does all it is told, but for one thing."""
-
-    def __init__(self, fails_at: State | None = None) -> None:
-        self.fails_at = fails_at
-        self.state = State.OBSERVE
-        self.states: list[State] = []
-        self.poses: list[np.ndarray] = []
-
-    def enter(self, state: State) -> None:
-        self.state = state
-        self.states.append(state)
-
-    def _done(self) -> bool:
-        return self.state is not self.fails_at
-
-    def move(self, world_from_gripper: np.ndarray) -> bool:
-        self.poses.append(world_from_gripper)
-        return self._done()
-
-    def seal(self) -> bool:
-        return self._done()
-
-    def lift(self) -> bool:
-        return self._done()
-
-    def shake(self) -> bool:
-        return self._done()
-
-
-def near_corner(_: Observation, world_from_contact: np.ndarray) -> np.ndarray:
+def near_corner(_: Sequence[DepthPicture], candidates: Candidates) -> np.ndarray:
     """Quality grows towards the plate's corner."""
-    return np.asarray(world_from_contact[:, 0, 3] + world_from_contact[:, 1, 3])
+    place = candidates.world_from_contact[:, :2, 3]
+    return np.asarray(0.5 + 5 * place.sum(axis=1))
 
 
-def tried(points: np.ndarray, fails_at: State | None = None) -> tuple[Cause, FakeRobot, FakeSensor]:
-    robot, sensor = FakeRobot(fails_at), FakeSensor(points)
+CLOSED = Strategy("closed-loop", near_corner, several_views=True, corrects=True, trims=True)
+OPEN = replace(CLOSED, several_views=False, corrects=False, trims=False)
+
+
+def tried(
+    points: np.ndarray,
+    robot: FakeRobot,
+    strategy: Strategy = CLOSED,
+    pictures: int = 10_000,
+    avoid_m: Sequence[np.ndarray] = (),
+) -> tuple[Decision, FakeEyes]:
+    eyes = FakeEyes(points, robot, pictures)
     rng = np.random.default_rng(0)
-    decision = attempt(sensor, robot, near_corner, CONFIG, RADIUS_M, rng)
-    return decision.cause, robot, sensor
+    attempt = Attempt(eyes, robot, strategy, CONFIG, RADIUS_M, rng, avoid_m)
+    return attempt.run(), eyes
 
 
 @pytest.mark.parametrize(
@@ -82,7 +59,9 @@ def tried(points: np.ndarray, fails_at: State | None = None) -> tuple[Cause, Fak
     ],
 )
 def test_each_failure_has_its_cause(fails_at: State | None, cause: Cause) -> None:
-    assert tried(plate(), fails_at)[0] is cause
+    robot = FakeRobot(TOP_M, fails_at)
+    assert tried(plate(), robot)[0].cause is cause
+    assert robot.states[-1] is State.DONE
 
 
 @pytest.mark.parametrize(
@@ -96,25 +75,72 @@ def test_each_failure_has_its_cause(fails_at: State | None, cause: Cause) -> Non
     ids=["nothing", "bare table", "NaN depth", "a wall"],
 )
 def test_a_poor_view_ends_the_attempt_not_the_run(points: np.ndarray, cause: Cause) -> None:
-    found, robot, _ = tried(points)
-    assert found is cause
+    robot = FakeRobot(TOP_M)
+    assert tried(points, robot, OPEN)[0].cause is cause
     assert robot.poses == []
 
 
-def test_it_goes_to_the_best_candidate_and_looks_again_on_the_way() -> None:
-    _, robot, sensor = tried(plate())
-    assert sensor.looks == 1 + CONFIG.policy.corrections
-    first, last = robot.poses[0], robot.poses[-1]
-    assert last[0, 3] + last[1, 3] >= first[0, 3] + first[1, 3] > 0.07
-    heights = [pose[2, 3] for pose in robot.poses]
-    assert heights == sorted(heights, reverse=True)
-    assert robot.states[-1] is State.DONE
+@pytest.mark.parametrize("pictures", [0, 1, 2, 4], ids=lambda n: f"after {n}")
+def test_a_camera_that_stops_ends_the_attempt(pictures: int) -> None:
+    decision, _ = tried(plate(), FakeRobot(TOP_M), pictures=pictures)
+    assert decision.cause is Cause.CAMERA_STOPPED
 
 
-def test_approach_is_the_mean_normal_of_a_tilted_plate() -> None:
-    tilt = 0.3
-    turn = np.array([[np.cos(tilt), 0, np.sin(tilt)], [0, 1, 0], [-np.sin(tilt), 0, np.cos(tilt)]])
-    points = plate() @ turn.T
-    frames = candidates_at(points, np.array([840]), EYE, RADIUS_M, CONFIG.policy.tilt_max_rad)
-    np.testing.assert_allclose(frames[0, :3, 2], turn[:, 2], atol=1e-9)
-    assert len(candidates_at(points, np.array([840]), EYE, RADIUS_M, tilt_max_rad=0.2)) == 0
+def test_what_cannot_be_reached_is_named() -> None:
+    robot = FakeRobot(TOP_M, reach_m=0.01)
+    points = plate() + np.array([0.2, 0.0, 0.0])
+    assert tried(points, robot)[0].cause is Cause.UNREACHABLE
+
+
+def test_of_two_plates_the_one_within_reach_is_tried() -> None:
+    robot = FakeRobot(TOP_M, reach_m=0.1)
+    points = np.concatenate([plate(), plate() + np.array([0.25, 0.0, 0.0])])
+    decision, _ = tried(points, robot)
+    assert decision.cause is Cause.LIFTED
+    assert decision.world_from_contact[0, 3] < 0.1
+
+
+def test_a_surface_that_is_not_there_is_no_contact() -> None:
+    assert tried(plate(), FakeRobot(surface_m=-1.0))[0].cause is Cause.NO_CONTACT
+
+
+def test_it_goes_to_the_best_and_corrects_on_the_way() -> None:
+    robot = FakeRobot(TOP_M)
+    decision, eyes = tried(plate(), robot)
+    assert eyes.static_looks == 1
+    # Two looks before the choice, as the plate's corners are 141 mm apart, then some.
+    assert eyes.wrist_looks == CONFIG.policy.wrist_views + decision.corrections
+    assert decision.corrections >= 4
+    assert decision.world_from_contact[:2, 3].sum() > 0.08
+    np.testing.assert_allclose(decision.world_from_contact[:3, 2], [0, 0, 1], atol=0.02)
+
+
+def test_a_correction_follows_an_object_that_moved() -> None:
+    robot = FakeRobot(TOP_M)
+    eyes = FakeEyes(plate(), robot)
+    rng = np.random.default_rng(0)
+    attempt = Attempt(eyes, robot, CLOSED, CONFIG, RADIUS_M, rng)
+    enter = robot.enter
+
+    def bumped(state: State) -> None:
+        enter(state)
+        if state is State.APPROACH:
+            eyes.points = plate() - np.array([0.01, 0.01, 0.0])
+
+    robot.enter = bumped  # type: ignore[method-assign]
+    place = attempt.run().world_from_contact[:2, 3]
+    assert place.max() <= 0.041
+
+
+def test_without_corrections_the_first_pose_stands() -> None:
+    decision, eyes = tried(plate(), FakeRobot(TOP_M), OPEN)
+    assert eyes.wrist_looks == decision.corrections == 0
+    assert decision.cause is Cause.LIFTED
+
+
+def test_a_place_that_failed_is_not_tried_again() -> None:
+    first, _ = tried(plate(), FakeRobot(TOP_M, State.SEAL), OPEN)
+    failed = first.world_from_contact[:3, 3]
+    second, _ = tried(plate(), FakeRobot(TOP_M), OPEN, avoid_m=[failed])
+    distance = np.linalg.norm(second.world_from_contact[:3, 3] - failed)
+    assert distance > CONFIG.policy.avoid_radius_m

@@ -2,7 +2,7 @@
 
 import pytest
 
-from pipeline.control.success import success_rate
+from pipeline.control.success import Outcome, advantage, success_rate
 
 
 def test_wilson_interval_of_eight_in_ten() -> None:
@@ -12,3 +12,19 @@ def test_wilson_interval_of_eight_in_ten() -> None:
 
 def test_no_attempt_says_nothing() -> None:
     assert success_rate(0, 0) == (0.0, 0.0, 1.0)
+
+
+def test_a_policy_that_is_always_better_is_significantly_so() -> None:
+    """Eight clutters, each won: of 2^8 exchanges two are as extreme, so p = 2 / 256."""
+    ours = [Outcome(9, 10)] * 8
+    theirs = [Outcome(3 + i % 3, 10) for i in range(8)]
+    found = advantage(ours, theirs)
+    assert found.p_paired == pytest.approx(2 / 256)
+    assert found.rate == pytest.approx(0.9)
+    assert found.p_fisher < 1e-6
+
+
+def test_equal_policies_do_not_differ() -> None:
+    same = [Outcome(5, 10), Outcome(0, 0)]
+    found = advantage(same, same)
+    assert (found.p_paired, found.p_fisher) == (1.0, 1.0)

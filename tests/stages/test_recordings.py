@@ -62,7 +62,7 @@ def test_the_viewer_shows_all_of_it(seen: tuple[str, Sight], empty_share: float)
         "grasps": "Pad by pressure (dark 0, yellow 1; red: lifted), wrench, cloud; in GCS",
         "shards": "Clouds by growing q, units of r_G",
         "train": "Worst test samples: q / q-hat",
-        "evaluate": "Scene, pad and its path",
+        "evaluate": "Scene, gripper and its path, candidates by q-hat",
     }
     assert drawn_share(sight.view_png[spatial[stage]]) > empty_share + DRAWN
 

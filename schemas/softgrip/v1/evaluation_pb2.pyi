@@ -8,7 +8,7 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class Attempt(_message.Message):
-    __slots__ = ("scene_id", "level", "attempt", "outcome", "cause", "target", "candidates", "predicted_quality", "reached_quality", "seal_pressure", "lifted_height_m", "duration_s", "world_from_gripper", "reached_pose", "time_s", "gripper_path", "object_paths", "base_wrench", "states")
+    __slots__ = ("scene_id", "level", "attempt", "outcome", "cause", "target", "candidates", "predicted_quality", "reached_quality", "seal_pressure", "lifted_height_m", "duration_s", "world_from_gripper", "reached_pose", "time_s", "gripper_path", "object_paths", "base_wrench", "states", "policy", "candidate_poses", "candidate_quality", "corrections", "pictures")
     SCENE_ID_FIELD_NUMBER: _ClassVar[int]
     LEVEL_FIELD_NUMBER: _ClassVar[int]
     ATTEMPT_FIELD_NUMBER: _ClassVar[int]
@@ -28,6 +28,11 @@ class Attempt(_message.Message):
     OBJECT_PATHS_FIELD_NUMBER: _ClassVar[int]
     BASE_WRENCH_FIELD_NUMBER: _ClassVar[int]
     STATES_FIELD_NUMBER: _ClassVar[int]
+    POLICY_FIELD_NUMBER: _ClassVar[int]
+    CANDIDATE_POSES_FIELD_NUMBER: _ClassVar[int]
+    CANDIDATE_QUALITY_FIELD_NUMBER: _ClassVar[int]
+    CORRECTIONS_FIELD_NUMBER: _ClassVar[int]
+    PICTURES_FIELD_NUMBER: _ClassVar[int]
     scene_id: str
     level: int
     attempt: int
@@ -47,10 +52,27 @@ class Attempt(_message.Message):
     object_paths: _tensor_pb2.Tensor
     base_wrench: _tensor_pb2.Tensor
     states: _containers.RepeatedScalarFieldContainer[str]
-    def __init__(self, scene_id: _Optional[str] = ..., level: _Optional[int] = ..., attempt: _Optional[int] = ..., outcome: _Optional[str] = ..., cause: _Optional[str] = ..., target: _Optional[str] = ..., candidates: _Optional[int] = ..., predicted_quality: _Optional[float] = ..., reached_quality: _Optional[float] = ..., seal_pressure: _Optional[float] = ..., lifted_height_m: _Optional[float] = ..., duration_s: _Optional[float] = ..., world_from_gripper: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., reached_pose: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., time_s: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., gripper_path: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., object_paths: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., base_wrench: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., states: _Optional[_Iterable[str]] = ...) -> None: ...
+    policy: str
+    candidate_poses: _tensor_pb2.Tensor
+    candidate_quality: _tensor_pb2.Tensor
+    corrections: int
+    pictures: _containers.RepeatedCompositeFieldContainer[DepthPicture]
+    def __init__(self, scene_id: _Optional[str] = ..., level: _Optional[int] = ..., attempt: _Optional[int] = ..., outcome: _Optional[str] = ..., cause: _Optional[str] = ..., target: _Optional[str] = ..., candidates: _Optional[int] = ..., predicted_quality: _Optional[float] = ..., reached_quality: _Optional[float] = ..., seal_pressure: _Optional[float] = ..., lifted_height_m: _Optional[float] = ..., duration_s: _Optional[float] = ..., world_from_gripper: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., reached_pose: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., time_s: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., gripper_path: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., object_paths: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., base_wrench: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., states: _Optional[_Iterable[str]] = ..., policy: _Optional[str] = ..., candidate_poses: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., candidate_quality: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., corrections: _Optional[int] = ..., pictures: _Optional[_Iterable[_Union[DepthPicture, _Mapping]]] = ...) -> None: ...
+
+class DepthPicture(_message.Message):
+    __slots__ = ("camera", "depth_mm", "intrinsics", "world_from_camera")
+    CAMERA_FIELD_NUMBER: _ClassVar[int]
+    DEPTH_MM_FIELD_NUMBER: _ClassVar[int]
+    INTRINSICS_FIELD_NUMBER: _ClassVar[int]
+    WORLD_FROM_CAMERA_FIELD_NUMBER: _ClassVar[int]
+    camera: str
+    depth_mm: _tensor_pb2.Tensor
+    intrinsics: _tensor_pb2.Tensor
+    world_from_camera: _tensor_pb2.Tensor
+    def __init__(self, camera: _Optional[str] = ..., depth_mm: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., intrinsics: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., world_from_camera: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ...) -> None: ...
 
 class LevelResult(_message.Message):
-    __slots__ = ("level", "attempts", "lifted", "objects", "clutters", "cleared", "success_rate", "interval_low", "interval_high", "failures")
+    __slots__ = ("level", "attempts", "lifted", "objects", "clutters", "cleared", "success_rate", "interval_low", "interval_high", "failures", "policy", "seconds_a_pick", "picks_an_hour")
     class FailuresEntry(_message.Message):
         __slots__ = ("key", "value")
         KEY_FIELD_NUMBER: _ClassVar[int]
@@ -68,6 +90,9 @@ class LevelResult(_message.Message):
     INTERVAL_LOW_FIELD_NUMBER: _ClassVar[int]
     INTERVAL_HIGH_FIELD_NUMBER: _ClassVar[int]
     FAILURES_FIELD_NUMBER: _ClassVar[int]
+    POLICY_FIELD_NUMBER: _ClassVar[int]
+    SECONDS_A_PICK_FIELD_NUMBER: _ClassVar[int]
+    PICKS_AN_HOUR_FIELD_NUMBER: _ClassVar[int]
     level: int
     attempts: int
     lifted: int
@@ -78,4 +103,25 @@ class LevelResult(_message.Message):
     interval_low: float
     interval_high: float
     failures: _containers.ScalarMap[str, int]
-    def __init__(self, level: _Optional[int] = ..., attempts: _Optional[int] = ..., lifted: _Optional[int] = ..., objects: _Optional[int] = ..., clutters: _Optional[int] = ..., cleared: _Optional[int] = ..., success_rate: _Optional[float] = ..., interval_low: _Optional[float] = ..., interval_high: _Optional[float] = ..., failures: _Optional[_Mapping[str, int]] = ...) -> None: ...
+    policy: str
+    seconds_a_pick: float
+    picks_an_hour: float
+    def __init__(self, level: _Optional[int] = ..., attempts: _Optional[int] = ..., lifted: _Optional[int] = ..., objects: _Optional[int] = ..., clutters: _Optional[int] = ..., cleared: _Optional[int] = ..., success_rate: _Optional[float] = ..., interval_low: _Optional[float] = ..., interval_high: _Optional[float] = ..., failures: _Optional[_Mapping[str, int]] = ..., policy: _Optional[str] = ..., seconds_a_pick: _Optional[float] = ..., picks_an_hour: _Optional[float] = ...) -> None: ...
+
+class Comparison(_message.Message):
+    __slots__ = ("policy", "baseline", "clutters", "success_rate", "baseline_success_rate", "p_paired", "p_fisher")
+    POLICY_FIELD_NUMBER: _ClassVar[int]
+    BASELINE_FIELD_NUMBER: _ClassVar[int]
+    CLUTTERS_FIELD_NUMBER: _ClassVar[int]
+    SUCCESS_RATE_FIELD_NUMBER: _ClassVar[int]
+    BASELINE_SUCCESS_RATE_FIELD_NUMBER: _ClassVar[int]
+    P_PAIRED_FIELD_NUMBER: _ClassVar[int]
+    P_FISHER_FIELD_NUMBER: _ClassVar[int]
+    policy: str
+    baseline: str
+    clutters: int
+    success_rate: float
+    baseline_success_rate: float
+    p_paired: float
+    p_fisher: float
+    def __init__(self, policy: _Optional[str] = ..., baseline: _Optional[str] = ..., clutters: _Optional[int] = ..., success_rate: _Optional[float] = ..., baseline_success_rate: _Optional[float] = ..., p_paired: _Optional[float] = ..., p_fisher: _Optional[float] = ...) -> None: ...

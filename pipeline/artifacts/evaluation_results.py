@@ -1,0 +1,135 @@
+"""What the attempts of an evaluation come to: by level, by policy, and policy against policy."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from pipeline.clutter.scene import ClutterScene
+from pipeline.config.evaluation import PolicyName
+from pipeline.control.success import Outcome, advantage, success_rate
+from schemas.softgrip.v1.evaluation_pb2 import Attempt, Comparison, LevelResult
+
+ALL_LEVELS = 0
+
+
+@dataclass(frozen=True)
+class Results:
+    """levels : every policy at every level. policies : every policy over all levels (level 0).
+
+    comparisons : the first policy against each of the others.
+    """
+
+    levels: list[LevelResult]
+    policies: list[LevelResult]
+    comparisons: list[Comparison]
+
+    def summary(self) -> dict[str, object]:
+        """The stage's headline figures; `success_by_level` is the first policy's."""
+        first = self.policies[0]
+        return {
+            "attempts": first.attempts,
+            "success_by_level": {
+                str(r.level): _figures(r) for r in self.levels if r.policy == first.policy
+            },
+            "policies": {
+                r.policy: {
+                    **_figures(r),
+                    "by_level": {
+                        str(level.level): round(level.success_rate, 4)
+                        for level in self.levels
+                        if level.policy == r.policy
+                    },
+                }
+                for r in self.policies
+            },
+            "comparisons": {
+                c.baseline: {
+                    "success": c.success_rate,
+                    "baseline_success": c.baseline_success_rate,
+                    "clutters": c.clutters,
+                    "p_paired": c.p_paired,
+                    "p_fisher": c.p_fisher,
+                }
+                for c in self.comparisons
+            },
+        }
+
+
+def results_of(
+    scenes: list[ClutterScene], policies: Sequence[PolicyName], attempts: list[Attempt]
+) -> Results:
+    """Count them."""
+    levels = sorted({scene.level for scene in scenes})
+    by_level = [
+        _result(policy, level, [s for s in scenes if s.level == level], attempts)
+        for policy in policies
+        for level in levels
+    ]
+    overall = [_result(policy, ALL_LEVELS, scenes, attempts) for policy in policies]
+    first, *others = policies
+    comparisons = [_comparison(first, other, scenes, attempts) for other in others]
+    return Results(by_level, overall, comparisons)
+
+
+def _result(
+    policy: PolicyName, level: int, scenes: list[ClutterScene], attempts: list[Attempt]
+) -> LevelResult:
+    """One policy on some clutters, with its 95 % interval and the causes of its failures."""
+    ids = {scene.scene_id for scene in scenes}
+    mine = [made for made in attempts if made.policy == policy and made.scene_id in ids]
+    lifted = sum(made.outcome == "lifted" for made in mine)
+    by_scene = Counter(made.scene_id for made in mine if made.outcome == "lifted")
+    rate, low, high = success_rate(lifted, len(mine))
+    time_s = sum(made.duration_s for made in mine)
+    return LevelResult(
+        policy=policy,
+        level=level,
+        attempts=len(mine),
+        lifted=lifted,
+        objects=sum(len(scene.objects) for scene in scenes),
+        clutters=len(scenes),
+        cleared=sum(by_scene[scene.scene_id] == len(scene.objects) for scene in scenes),
+        success_rate=rate,
+        interval_low=low,
+        interval_high=high,
+        failures=Counter(made.cause for made in mine if made.outcome != "lifted"),
+        seconds_a_pick=time_s / lifted if lifted else 0.0,
+        picks_an_hour=3600 * lifted / time_s if time_s else 0.0,
+    )
+
+
+def _comparison(
+    policy: PolicyName, baseline: PolicyName, scenes: list[ClutterScene], attempts: list[Attempt]
+) -> Comparison:
+    ours, theirs = (
+        [_outcome(name, scene, attempts) for scene in scenes] for name in (policy, baseline)
+    )
+    found = advantage(ours, theirs)
+    return Comparison(
+        policy=policy,
+        baseline=baseline,
+        clutters=len(scenes),
+        success_rate=found.rate,
+        baseline_success_rate=found.baseline_rate,
+        p_paired=found.p_paired,
+        p_fisher=found.p_fisher,
+    )
+
+
+def _outcome(policy: PolicyName, scene: ClutterScene, attempts: list[Attempt]) -> Outcome:
+    mine = [a for a in attempts if a.policy == policy and a.scene_id == scene.scene_id]
+    return Outcome(sum(a.outcome == "lifted" for a in mine), len(mine))
+
+
+def _figures(result: LevelResult) -> dict[str, object]:
+    return {
+        "rate": result.success_rate,
+        "interval_95": [result.interval_low, result.interval_high],
+        "lifted": result.lifted,
+        "attempts": result.attempts,
+        "cleared": result.cleared,
+        "clutters": result.clutters,
+        "failures": dict(sorted(result.failures.items())),
+        "seconds_a_pick": round(result.seconds_a_pick, 3),
+        "picks_an_hour": round(result.picks_an_hour, 1),
+    }

@@ -1,0 +1,51 @@
+"""Poses whose rigid parts would run into what was measured."""
+
+import numba
+import numpy as np
+from jaxtyping import Bool, Float
+
+from pipeline.config.evaluation import HandConfig
+
+# The soft pad drapes up to its altitude H, so the rigid stem begins above that (Table I).
+STEM_BEGINS_M = 0.035
+_MARGIN_M = 0.004
+
+
+def free_of_collision(
+    world_from_gripper: Float[np.ndarray, "k 4 4"],
+    points_m: Float[np.ndarray, "n 3"],
+    hand: HandConfig,
+) -> Bool[np.ndarray, " k"]:
+    """Whether the stem, at the contact and all the way down to it, meets no measured point.
+
+    The stem goes down along its own axis, so what it sweeps is its own cylinder, made longer.
+    """
+    return np.asarray(
+        _free(
+            np.ascontiguousarray(world_from_gripper),
+            np.ascontiguousarray(points_m),
+            hand.stem_radius_m + _MARGIN_M,
+            STEM_BEGINS_M - _MARGIN_M,
+        )
+    )
+
+
+@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+def _free(
+    poses: Float[np.ndarray, "k 4 4"],
+    points: Float[np.ndarray, "n 3"],
+    radius: float,
+    begins: float,
+) -> Bool[np.ndarray, " k"]:
+    free = np.ones(len(poses), dtype=np.bool_)
+    for i in range(len(poses)):
+        pose = poses[i]
+        for j in range(len(points)):
+            x = points[j, 0] - pose[0, 3]
+            y = points[j, 1] - pose[1, 3]
+            z = points[j, 2] - pose[2, 3]
+            along = pose[0, 2] * x + pose[1, 2] * y + pose[2, 2] * z
+            if along > begins and x * x + y * y + z * z - along * along < radius * radius:
+                free[i] = False
+                break
+    return free

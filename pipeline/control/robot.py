@@ -1,0 +1,85 @@
+"""What the policy needs of the world: eyes, and a robot that moves one control step at a time."""
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Protocol
+
+import numpy as np
+from jaxtyping import Float
+
+from pipeline.control.cloud import DepthPicture
+from pipeline.sensing.cameras import PinholeCamera
+
+
+class State(StrEnum):
+    """Where an attempt is."""
+
+    OBSERVE = "observe"
+    PREGRASP = "pregrasp"
+    APPROACH = "approach"
+    SEAL = "seal"
+    LIFT = "lift"
+    SHAKE = "shake"
+    DONE = "done"
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """What the robot felt during one control step.
+
+    world_from_gripper : the pose reached at its end.
+    wrench : (6,) mean force [N] and moment [N m] that the world exerts on the gripper, at the
+        gripper's base (the flange), in GCS; its own weight is taken off. An object that hangs
+        on a level pad pulls along -z.
+    peak_n : largest force during the step [N].
+    arrived : whether the target was reached.
+    """
+
+    world_from_gripper: Float[np.ndarray, "4 4"]
+    wrench: Float[np.ndarray, " 6"]
+    peak_n: float
+    arrived: bool
+
+
+class Eyes(Protocol):
+    """The cameras. None is what a camera that has stopped delivers."""
+
+    def static(self) -> list[DepthPicture] | None:
+        """One picture of every camera beside the table."""
+        ...
+
+    def wrist_camera(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> PinholeCamera:
+        """The wrist's camera as it is calibrated, for the gripper at a pose."""
+        ...
+
+    def wrist(self, around_m: Float[np.ndarray, " 3"], radius_m: float) -> DepthPicture | None:
+        """What the wrist's camera sees of a ball in WCS from where the gripper is now."""
+        ...
+
+
+class Robot(Protocol):
+    """Moves the gripper and switches the vacuum."""
+
+    def enter(self, state: State) -> None:
+        """Told what the policy is at, for the record."""
+        ...
+
+    def pose(self) -> Float[np.ndarray, "4 4"]:
+        """world_from_gripper now."""
+        ...
+
+    def reachable(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> bool:
+        """Whether the robot can take the pose, joint limits and all."""
+        ...
+
+    def step(self, world_from_gripper: Float[np.ndarray, "4 4"], speed_m_s: float) -> Reading:
+        """One control period straight towards a pose; it stops where the pad touches."""
+        ...
+
+    def vacuum(self, on: bool) -> None:
+        """Switch the vacuum."""
+        ...
+
+    def shake(self) -> Reading:
+        """Side to side, then still, as `LiftConfig` says; the mean wrench while still."""
+        ...

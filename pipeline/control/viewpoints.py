@@ -1,0 +1,50 @@
+"""Where the wrist looks from before a choice is made, and how it is turned about its axis."""
+
+import numpy as np
+from jaxtyping import Float
+
+_APART_M = 0.12  # a second look nearer than this would show the same again
+
+
+def best_apart(
+    places_m: Float[np.ndarray, "k 3"], quality: Float[np.ndarray, " k"], count: int
+) -> list[Float[np.ndarray, " 3"]]:
+    """The most promising places, each at least 120 mm from those before; at most ``count``."""
+    chosen: list[Float[np.ndarray, " 3"]] = []
+    for index in np.argsort(-quality, kind="stable"):
+        if len(chosen) == count:
+            break
+        if all(np.linalg.norm(places_m[index] - other) >= _APART_M for other in chosen):
+            chosen.append(places_m[index])
+    return chosen
+
+
+def gripper_above(
+    place_m: Float[np.ndarray, " 3"], height_m: float, before: Float[np.ndarray, "4 4"]
+) -> Float[np.ndarray, "4 4"]:
+    """The gripper upright above a place; about the vertical it stays as it was before."""
+    pose = np.eye(4)
+    heading = np.arctan2(before[1, 0], before[0, 0])
+    cosine, sine = np.cos(heading), np.sin(heading)
+    pose[:2, :2] = [[cosine, -sine], [sine, cosine]]
+    pose[:3, 3] = place_m
+    pose[2, 3] += height_m
+    return pose
+
+
+def facing(
+    world_from_contact: Float[np.ndarray, "4 4"], before: Float[np.ndarray, "4 4"]
+) -> Float[np.ndarray, "4 4"]:
+    """The pose turned about its approach so that the wrist turns as little as can be.
+
+    The pad is round: its spin is free, and the camera and the arm are glad of the shortest way.
+    """
+    z = world_from_contact[:3, 2]
+    x = before[:3, 0] - (before[:3, 0] @ z) * z
+    length = np.linalg.norm(x)
+    if length < 1e-6:
+        return world_from_contact
+    pose = world_from_contact.copy()
+    pose[:3, 0] = x / length
+    pose[:3, 1] = np.cross(z, pose[:3, 0])
+    return pose

@@ -1,0 +1,94 @@
+"""What the wrench at the gripper's base tells: contact, collision, seal, slip, loss.
+
+Supplement VI: the force-torque wrench is «mainly utilized to monitor the grasp status, like
+collision and grasp success, optimize the robotic motion, and minimize the moments on the gripper
+base during grasping».
+"""
+
+from enum import StrEnum
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial.transform import Rotation
+
+from pipeline.config.evaluation import PolicyConfig
+from pipeline.control.robot import Reading
+
+CONTACT_N = 0.5  # a push on the pad that is a touch
+_TRIM_STEP_RAD = 0.06  # a control step
+_TRIM_LEVER_M = 0.25  # from the base to what hangs on it, about
+_TRIM_MOMENT_NM = 0.005  # less is not worth a tilt
+
+
+class Event(StrEnum):
+    """What was felt."""
+
+    NOTHING = "nothing"
+    CONTACT = "contact"
+    COLLISION = "collision"
+    SLIP = "slip"
+    LOSS = "loss"
+
+
+class WrenchMonitor:
+    """Watches the readings of one attempt."""
+
+    def __init__(self, config: PolicyConfig) -> None:
+        self._config = config
+        self._line: Float[np.ndarray, " 3"] | None = None
+
+    def moving(self, reading: Reading) -> Event:
+        """In free space and on the way down: a push on the pad, or more than may be."""
+        if reading.peak_n > self._config.force_limit_n:
+            return Event.COLLISION
+        if reading.wrench[2] > CONTACT_N:
+            return Event.CONTACT
+        return Event.NOTHING
+
+    def holds(self, reading: Reading) -> bool:
+        """Whether something hangs on the gripper: its pull shows the seal (grasp success)."""
+        return hanging_n(reading) >= self._config.tension_min_n
+
+    def carrying(self, reading: Reading) -> Event:
+        """While something is held: gone, or shifted under the pad."""
+        if not self.holds(reading):
+            return Event.LOSS
+        before, self._line = self._line, line_of_load(reading.wrench)
+        if before is not None and np.linalg.norm(self._line - before) > self._config.slip_m:
+            return Event.SLIP
+        return Event.NOTHING
+
+
+def hanging_n(reading: Reading) -> float:
+    """Downward pull on the gripper in WCS [N]."""
+    return -float(reading.world_from_gripper[2, :3] @ reading.wrench[:3])
+
+
+def line_of_load(wrench: Float[np.ndarray, " 6"]) -> Float[np.ndarray, " 3"]:
+    """The point of a force's line of action nearest to the base: F x M / |F|^2, in GCS [m]."""
+    force, moment = wrench[:3], wrench[3:]
+    return np.asarray(np.cross(force, moment) / max(float(force @ force), 1e-12))
+
+
+def trimmed(
+    world_from_gripper: Float[np.ndarray, "4 4"],
+    wrench: Float[np.ndarray, " 6"],
+    left_rad: float,
+) -> tuple[Float[np.ndarray, "4 4"], float]:
+    """The pose turned about the pad towards less moment at the base, and the angle turned.
+
+    A load F at r from the base has the moment M = r x F. A turn by a small angle about M moves
+    the load's line nearer to the base, by the angle times the load's depth below it. Torsion
+    about the gripper's axis is left alone: no tilt mends it. left_rad : most it may turn.
+    """
+    force = wrench[:3]
+    moment = wrench[3:] * [1.0, 1.0, 0.0]
+    size = float(np.linalg.norm(moment))
+    if size < _TRIM_MOMENT_NM:
+        return world_from_gripper, 0.0
+    aside_m = size / max(float(np.linalg.norm(force)), 1e-9)
+    angle = min(aside_m / _TRIM_LEVER_M, _TRIM_STEP_RAD, left_rad)
+    turn = Rotation.from_rotvec(angle * moment / size).as_matrix()
+    pose = world_from_gripper.copy()
+    pose[:3, :3] = pose[:3, :3] @ turn
+    return pose, angle

@@ -1,0 +1,56 @@
+"""The verdict of an evaluation as a person reads it: Markdown."""
+
+from collections.abc import Sequence
+
+from schemas.softgrip.v1.evaluation_pb2 import Comparison, LevelResult
+
+
+def markdown(
+    levels: Sequence[LevelResult],
+    policies: Sequence[LevelResult],
+    comparisons: Sequence[Comparison],
+) -> str:
+    """A table of each policy by level, then the policies over all levels, side by side."""
+    parts = [_policy_table(p.policy, [r for r in levels if r.policy == p.policy]) for p in policies]
+    rows = "\n".join(
+        f"| {p.policy} | {_rate(p)} | {p.lifted} / {p.objects} | {p.cleared} / {p.clutters} "
+        f"| {p.seconds_a_pick:.1f} | {p.picks_an_hour:.0f} |"
+        for p in policies
+    )
+    parts.append(
+        "### All levels\n\n"
+        "| policy | success (95 % interval) | objects lifted | clutters cleared "
+        f"| seconds a pick | picks an hour |\n|-|-|-|-|-|-|\n{rows}\n"
+    )
+    if comparisons:
+        parts.append(_comparison_table(comparisons))
+    return "\n".join(parts)
+
+
+def _policy_table(policy: str, levels: Sequence[LevelResult]) -> str:
+    rows = "\n".join(
+        f"| {r.level} | {r.lifted} / {r.attempts} | {_rate(r)} | {r.cleared} / {r.clutters} "
+        f"| {', '.join(f'{cause} {n}' for cause, n in sorted(r.failures.items())) or 'none'} |"
+        for r in levels
+    )
+    return (
+        f"### {policy}\n\n| level | lifted | success (95 % interval) | cleared | failures |\n"
+        f"|-|-|-|-|-|\n{rows}\n"
+    )
+
+
+def _comparison_table(comparisons: Sequence[Comparison]) -> str:
+    rows = "\n".join(
+        f"| {c.baseline} | {100 * c.success_rate:.1f} % | {100 * c.baseline_success_rate:.1f} % "
+        f"| {c.clutters} | {c.p_paired:.2g} | {c.p_fisher:.2g} |"
+        for c in comparisons
+    )
+    return (
+        f"### {comparisons[0].policy} against\n\n"
+        "| baseline | success, mean over clutters | baseline's | clutters "
+        f"| p, paired by clutter | p, Fisher |\n|-|-|-|-|-|-|\n{rows}\n"
+    )
+
+
+def _rate(r: LevelResult) -> str:
+    return f"{100 * r.success_rate:.0f} % ({100 * r.interval_low:.0f}-{100 * r.interval_high:.0f})"

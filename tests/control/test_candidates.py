@@ -1,0 +1,90 @@
+"""Candidates on planes whose normal is known; collisions with posts; the geometric picker."""
+
+import numpy as np
+
+from pipeline.config import EvaluateConfig
+from pipeline.control.candidates import Candidates, candidates_at, sample_near
+from pipeline.control.clearance import STEM_BEGINS_M, free_of_collision
+from pipeline.control.cloud import Cloud, merged_cloud
+from pipeline.control.ranking import flattest_at_the_top, smoothed
+from pipeline.gripper.sampling import contact_frames
+from tests.control.fakes import picture_of
+from tests.control.test_policy import plate
+
+CONFIG = EvaluateConfig()
+EYE = np.array([0.0, 0.0, 0.9])
+RADIUS_M = 0.01
+
+
+def cloud_of(points: np.ndarray) -> Cloud:
+    return Cloud(points, np.broadcast_to(EYE, points.shape))
+
+
+def test_approach_is_the_mean_normal_of_a_tilted_plate() -> None:
+    tilt = 0.3
+    turn = np.array([[np.cos(tilt), 0, np.sin(tilt)], [0, 1, 0], [-np.sin(tilt), 0, np.cos(tilt)]])
+    points = plate() @ turn.T
+    middle, eye = points[12_960][None], EYE[None]
+    found = candidates_at(cloud_of(points), middle, eye, RADIUS_M, CONFIG.policy.tilt_max_rad)
+    np.testing.assert_allclose(found.world_from_contact[0, :3, 2], turn[:, 2], atol=1e-9)
+    np.testing.assert_allclose(found.world_from_contact[0, :3, 3], middle[0], atol=1e-9)
+    assert found.roughness_m[0] < 1e-6
+    assert len(candidates_at(cloud_of(points), middle, eye, RADIUS_M, tilt_max_rad=0.2)) == 0
+
+
+def test_neighbourhoods_agree_with_numpy() -> None:
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-0.03, 0.03, (400, 3)) * [1, 1, 0.02]
+    at = points[:5]
+    found = candidates_at(cloud_of(points), at, np.tile(EYE, (5, 1)), RADIUS_M, 1.5)
+    for pose, place in zip(found.world_from_contact, at, strict=True):
+        patch = points[np.linalg.norm(points - place, axis=1) <= RADIUS_M]
+        normal = np.linalg.eigh(np.cov(patch.T, bias=True))[1][:, 0]
+        assert abs(pose[:3, 2] @ normal) > 1 - 1e-9
+
+
+def test_merging_averages_noise_and_knows_no_density() -> None:
+    rng = np.random.default_rng(0)
+    eyes = [np.array([0.0, 0.1, 0.9]), np.array([0.3, 0.0, 0.5])]
+    noisy = plate() + rng.normal(0, 0.001, (len(plate()), 3)) * [0, 0, 1]
+    pictures = [picture_of(noisy, eye, np.zeros(3)) for eye in eyes]
+    one, other, both = (merged_cloud(p) for p in (pictures[:1], pictures[1:], pictures))
+    assert len(both) < 0.8 * (len(one) + len(other))
+    inside = np.abs(both.points_m[:, :2]).max(axis=1) < 0.045
+    assert both.points_m[inside, 2].std() < 0.001
+
+
+def test_the_aim_is_the_first_candidate_near_it() -> None:
+    aim = np.array([0.01, 0.02, 0.05])
+    near = sample_near(cloud_of(plate()), aim, 0.015, 20, RADIUS_M, 1.0, np.random.default_rng(0))
+    np.testing.assert_allclose(near.world_from_contact[0, :3, 3], aim, atol=1e-3)
+    assert np.linalg.norm(near.world_from_contact[:, :3, 3] - aim, axis=1).max() <= 0.016
+
+
+def test_a_post_beside_the_stem_is_in_the_way_of_one_pose_alone() -> None:
+    post = np.column_stack([np.full(20, 0.03), np.zeros(20), np.linspace(0, 0.15, 20)])
+    poses = contact_frames(
+        np.array([[0.0, 0, 0], [0.025, 0, 0]]), np.tile([0, 0, 1.0], (2, 1)), np.zeros(2)
+    )
+    assert free_of_collision(poses, post, CONFIG.hand).tolist() == [True, False]
+    low = post[post[:, 2] < STEM_BEGINS_M - 0.005]
+    assert free_of_collision(poses, low, CONFIG.hand).all()
+
+
+def test_the_geometric_picker_wants_the_flattest_at_the_top() -> None:
+    places = np.array([[0, 0, 0.10], [0, 0, 0.098], [0, 0, 0.05]])
+    poses = contact_frames(places, np.tile([0, 0, 1.0], (3, 1)), np.zeros(3))
+    value = flattest_at_the_top([], Candidates(poses, np.array([0.002, 0.0005, 0.0])))
+    assert np.argsort(-value).tolist() == [1, 0, 2]
+
+
+def test_smoothing_prefers_a_region_to_a_lucky_point() -> None:
+    """A lone 0.9 among neighbours of 0.5 is worth less than 0.8 among its like."""
+    x = np.concatenate([np.arange(5) * 0.002, 0.1 + np.arange(5) * 0.002])
+    places = np.column_stack([x, np.zeros(10), np.zeros(10)])
+    up = np.tile([0, 0, 1.0], (10, 1))
+    found = Candidates(contact_frames(places, up, np.zeros(10)), np.zeros(10))
+    quality = np.array([0.5, 0.5, 0.9, 0.5, 0.5, 0.8, 0.8, 0.8, 0.8, 0.8])
+    assert np.argmax(quality) == 2
+    assert np.argmax(smoothed(found, quality, 0.007)) >= 5
+    np.testing.assert_array_equal(smoothed(found, quality, 0.0), quality)

@@ -1,0 +1,70 @@
+"""The wrench monitor on wrenches of closed form."""
+
+import numpy as np
+import pytest
+
+from pipeline.config.evaluation import PolicyConfig
+from pipeline.control.robot import Reading
+from pipeline.control.wrench_monitor import Event, WrenchMonitor, line_of_load, trimmed
+
+CONFIG = PolicyConfig()
+WEIGHT = np.array([0.0, 0.0, -2.0])
+
+
+def reading(force: np.ndarray, at_m: np.ndarray | None = None, peak_n: float = 0.0) -> Reading:
+    moment = np.zeros(3) if at_m is None else np.cross(at_m, force)
+    return Reading(np.eye(4), np.concatenate([force, moment]), peak_n, arrived=False)
+
+
+def test_a_push_on_the_pad_is_contact_and_a_blow_is_a_collision() -> None:
+    monitor = WrenchMonitor(CONFIG)
+    assert monitor.moving(reading(np.zeros(3))) is Event.NOTHING
+    assert monitor.moving(reading(np.array([0, 0, 2.0]))) is Event.CONTACT
+    blow = reading(np.array([0, 0, 2.0]), peak_n=CONFIG.force_limit_n + 1)
+    assert monitor.moving(blow) is Event.COLLISION
+
+
+def test_a_pull_is_a_seal_and_its_end_is_a_loss() -> None:
+    monitor = WrenchMonitor(CONFIG)
+    assert not monitor.holds(reading(np.zeros(3)))
+    assert not monitor.holds(reading(-WEIGHT))
+    assert monitor.holds(reading(WEIGHT))
+    assert monitor.carrying(reading(WEIGHT)) is Event.NOTHING
+    assert monitor.carrying(reading(np.zeros(3))) is Event.LOSS
+
+
+def test_a_load_that_jumps_aside_has_slipped() -> None:
+    monitor = WrenchMonitor(CONFIG)
+    below = np.array([0.0, 0.0, -0.25])
+    assert monitor.carrying(reading(WEIGHT, below)) is Event.NOTHING
+    aside = below + np.array([CONFIG.slip_m / 2, 0, 0])
+    assert monitor.carrying(reading(WEIGHT, aside)) is Event.NOTHING
+    aside = aside + np.array([0, 1.5 * CONFIG.slip_m, 0])
+    assert monitor.carrying(reading(WEIGHT, aside)) is Event.SLIP
+
+
+def test_the_load_acts_along_its_line() -> None:
+    wrench = reading(WEIGHT, np.array([0.03, -0.01, -0.4])).wrench
+    np.testing.assert_allclose(line_of_load(wrench), [0.03, -0.01, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("aside_m", [0.004, 0.02])
+def test_trimming_lessens_the_moment_at_the_base(aside_m: float) -> None:
+    """The object hangs rigidly 0.25 m below the base: what a turn of the pose does is exact."""
+    hangs_at = np.array([aside_m, -aside_m, -0.25])  # from the base, in GCS
+    pose, left, sizes = np.eye(4), 0.5, []
+    for _ in range(6):
+        force = pose[:3, :3].T @ WEIGHT
+        wrench = np.concatenate([force, np.cross(hangs_at, force)])
+        sizes.append(float(np.linalg.norm(wrench[3:])))
+        pose, turned = trimmed(pose, wrench, left)
+        left -= turned
+    assert sizes[-1] < 0.35 * sizes[0]
+    assert (np.diff(sizes) <= 1e-12).all()
+
+
+def test_trimming_stays_within_its_bound() -> None:
+    wrench = np.array([0, 0, -2.0, 0.3, 0.0, 0.0])
+    pose, turned = trimmed(np.eye(4), wrench, 0.01)
+    assert turned == pytest.approx(0.01)
+    assert np.arccos(pose[2, 2]) == pytest.approx(0.01, abs=1e-6)
