@@ -46,6 +46,17 @@ class HandConfig(Section):
     )
 
 
+class ArmConfig(Section):
+    """Where the arm stands, for `robot = "iiwa14"`."""
+
+    base_m: tuple[float, float, float] = Field(
+        (-0.62, 0.0, 0.0), description="foot of the arm, upright, in WCS [m]"
+    )
+    home_m: tuple[float, float, float] = Field(
+        (-0.15, 0.0, 0.45), description="where the pad waits, pointing down [m]"
+    )
+
+
 class PolicyConfig(Section):
     """Candidates and the closed loop; Supplement VI."""
 
@@ -101,6 +112,7 @@ class EvaluateConfig(Section):
     suction: SuctionConfig = SuctionConfig()
     lift: LiftConfig = LiftConfig()
     hand: HandConfig = HandConfig()
+    arm: ArmConfig = ArmConfig()
     policy: PolicyConfig = PolicyConfig()
 
 

@@ -188,6 +188,8 @@ class Attempt:
             if event is Event.COLLISION:
                 self._travel(backed_off(self._robot.pose(), _RETREAT_M))
                 return Cause.COLLISION
+            if event is Event.BLOCKED:
+                return Cause.UNREACHABLE
             if event is Event.CONTACT:
                 return None
             if reading.arrived:
@@ -250,7 +252,7 @@ class Attempt:
                 return Cause.LOST_IN_LIFT
             if event is Event.SLIP:
                 speed = self._policy.speed_m_s / 2
-            if reading.arrived:
+            if reading.arrived or not reading.followed:
                 return None
 
     def _shake(self) -> Cause | None:
@@ -261,8 +263,9 @@ class Attempt:
         """Through free space to a pose."""
         while True:
             reading = self._robot.step(pose, self._policy.travel_m_s)
-            if self._monitor.moving(reading) is not Event.NOTHING:
-                return Cause.COLLISION
+            event = self._monitor.moving(reading)
+            if event is not Event.NOTHING:
+                return Cause.UNREACHABLE if event is Event.BLOCKED else Cause.COLLISION
             if reading.arrived:
                 return None
 
@@ -271,7 +274,7 @@ class Attempt:
         target[2, 3] += height_m
         while True:
             reading = self._robot.step(target, self._policy.speed_m_s)
-            if reading.arrived:
+            if reading.arrived or not reading.followed:
                 return reading
 
     def _sampled(self, cloud: Cloud) -> Candidates:

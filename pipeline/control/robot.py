@@ -32,13 +32,14 @@ class Reading:
         gripper's base (the flange), in GCS; its own weight is taken off. An object that hangs
         on a level pad pulls along -z.
     peak_n : largest force during the step [N].
-    arrived : whether the target was reached.
+    arrived : whether the target was reached. followed : False where the arm could not go on.
     """
 
     world_from_gripper: Float[np.ndarray, "4 4"]
     wrench: Float[np.ndarray, " 6"]
     peak_n: float
     arrived: bool
+    followed: bool = True
 
 
 class Eyes(Protocol):

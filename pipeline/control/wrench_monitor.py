@@ -26,6 +26,7 @@ class Event(StrEnum):
     NOTHING = "nothing"
     CONTACT = "contact"
     COLLISION = "collision"
+    BLOCKED = "blocked"
     SLIP = "slip"
     LOSS = "loss"
 
@@ -41,6 +42,8 @@ class WrenchMonitor:
         """In free space and on the way down: a push on the pad, or more than may be."""
         if reading.peak_n > self._config.force_limit_n:
             return Event.COLLISION
+        if not reading.followed:
+            return Event.BLOCKED
         if reading.wrench[2] > CONTACT_N:
             return Event.CONTACT
         return Event.NOTHING

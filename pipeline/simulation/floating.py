@@ -23,8 +23,8 @@ class Mover(Protocol):
         """Home, at once."""
         ...
 
-    def drive(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> None:
-        """Where to be at the end of the next physics step."""
+    def drive(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> bool:
+        """Where to be at the end of the next physics step; False where it cannot follow."""
         ...
 
     def pose(self) -> Float[np.ndarray, "4 4"]:
@@ -66,10 +66,11 @@ class FloatingMover:
         self._pose = HOME.copy()
         self._entity.pose = self._stem_pose()
 
-    def drive(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> None:
+    def drive(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> bool:
         """There by the end of the next physics step."""
         self._pose = world_from_gripper
         self._rigid.kinematic_target = self._stem_pose()
+        return True
 
     def pose(self) -> Float[np.ndarray, "4 4"]:
         """Exactly where it was told to be."""

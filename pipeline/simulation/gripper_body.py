@@ -26,6 +26,7 @@ from pipeline.simulation.suction_joint import SuctionJoint
 
 _TOUCH_N = 2.0  # what the pad's spring pushes with when it touches
 _ARRIVED_M, _ARRIVED_RAD = 1e-4, 1e-3
+_LAG_M = 0.002  # an arm that is this near has arrived
 _LEVER_M = 0.2  # a turn counts as the way of a point this far from the axis
 
 
@@ -72,6 +73,7 @@ class SuctionGripper:
         self._mover.reset()
         self._goal = self._mover.pose()
         self._speed_m_s = 0.0
+        self._follows = True
         self._state = State.OBSERVE
         self.target = 0
         self.reached_quality = self.seal_pressure = 0.0
@@ -208,7 +210,7 @@ class SuctionGripper:
 
     def _physics_step(self) -> tuple[Float[np.ndarray, " 6"], float]:
         """One step of the world; the load on the pad in GCS, and the push on rigid parts [N]."""
-        self._mover.drive(self._goal)
+        self._follows &= self._mover.drive(self._goal)
         load = np.zeros(6)
         if self._joint is not None:
             load, holds = self._joint.carry(self.pose())
@@ -247,7 +249,8 @@ class SuctionGripper:
             load = load + np.array([0.0, 0.0, _TOUCH_N, 0.0, 0.0, 0.0])
         wrench = self._at_base(load)
         self._sample(wrench)
-        return Reading(self.pose(), wrench, peak_n, arrived)
+        followed, self._follows = self._follows, True
+        return Reading(self.pose(), wrench, peak_n, arrived, followed)
 
     def _at_base(self, load: Float[np.ndarray, " 6"]) -> Float[np.ndarray, " 6"]:
         """A load at the pad's centre as the flange feels it."""
@@ -255,6 +258,10 @@ class SuctionGripper:
         return np.concatenate([load[:3], load[3:] + np.cross(pad_from_base, load[:3])])
 
     def _at(self, target: Float[np.ndarray, "4 4"]) -> bool:
+        """Whether it was told to be there and is."""
+        lag = float(np.linalg.norm(self._goal[:3, 3] - self.pose()[:3, 3]))
+        if lag > _LAG_M:
+            return False
         way = float(np.linalg.norm(target[:3, 3] - self._goal[:3, 3]))
         turn = float(np.linalg.norm(turn_between(self._goal, target)))
         return way <= _ARRIVED_M and turn <= _ARRIVED_RAD

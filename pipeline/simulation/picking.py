@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+import sapien
 from jaxtyping import Float
 
 from pipeline.clutter.scene import ClutterScene
@@ -13,9 +14,10 @@ from pipeline.control.policy import Attempt, Cause, Decision, Strategy
 from pipeline.control.ranking import NetworkRanking, Predict, flattest_at_the_top
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.gripper.pad import build_pad
+from pipeline.simulation.arm import ArmMover
 from pipeline.simulation.engine import Body, add_body, new_world
 from pipeline.simulation.eyes import SimulatedEyes
-from pipeline.simulation.floating import FloatingMover
+from pipeline.simulation.floating import FloatingMover, Mover
 from pipeline.simulation.gripper_body import Sample, SuctionGripper
 
 _COLOUR = (0.5, 0.5, 0.5)
@@ -58,6 +60,13 @@ def strategy_of(name: PolicyName, predict: Predict, config: RunConfig) -> Strate
     return Strategy(name, network, several_views=views, corrects=closed, trims=closed)
 
 
+def mover_of(world: sapien.Scene, config: RunConfig) -> Mover:
+    """What `evaluate.robot` names."""
+    if config.evaluate.robot == "iiwa14":
+        return ArmMover(world, config.evaluate.hand, config.evaluate.arm)
+    return FloatingMover(world, config.evaluate.hand, config.scenes.table_side_m)
+
+
 class Clutter:
     """One clutter in a world of its own, with a gripper over it."""
 
@@ -83,7 +92,7 @@ class Clutter:
             )
             for p in scene.objects
         }
-        mover = FloatingMover(self.world, config.evaluate.hand, config.scenes.table_side_m)
+        mover = mover_of(self.world, config)
         self.gripper = SuctionGripper(
             self.world, self.bodies, self.items, build_pad(config.gripper.pad), config, mover
         )

@@ -7,13 +7,13 @@ import pytest
 import trimesh
 
 from pipeline.config import RunConfig
-from pipeline.config.evaluation import EvaluateConfig, SuctionConfig
+from pipeline.config.evaluation import EvaluateConfig, RobotName, SuctionConfig
 from pipeline.control.robot import Reading
 from pipeline.control.wrench_monitor import hanging_n
 from pipeline.gripper.pad import build_pad
 from pipeline.simulation.engine import add_body, new_world
-from pipeline.simulation.floating import FloatingMover
 from pipeline.simulation.gripper_body import SuctionGripper
+from pipeline.simulation.picking import mover_of
 from tests.bodies import catalogue_object, pose_at
 
 BLOCK = (0.08, 0.08, 0.04)
@@ -28,14 +28,19 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def gripper_over(
-    shape: trimesh.Trimesh, cache: Path, density_kg_m3: float = 300.0, vacuum_pa: float = 8000.0
+    shape: trimesh.Trimesh,
+    cache: Path,
+    density_kg_m3: float = 300.0,
+    vacuum_pa: float = 8000.0,
+    robot: RobotName = "floating",
 ) -> SuctionGripper:
-    config = RunConfig(evaluate=EvaluateConfig(suction=SuctionConfig(vacuum_pa=vacuum_pa)))
+    suction = SuctionConfig(vacuum_pa=vacuum_pa)
+    config = RunConfig(evaluate=EvaluateConfig(suction=suction, robot=robot))
     item = catalogue_object("it", shape, cache, density_kg_m3)
     world = new_world(config.scenes, render=False)
     lowest = float(item.mesh.vertices_m[:, 2].min())
     body = add_body(world, item, pose_at(0, 0, -lowest), 1, (0.5, 0.5, 0.5), config.scenes)
-    mover = FloatingMover(world, config.evaluate.hand, config.scenes.table_side_m)
+    mover = mover_of(world, config)
     pad = build_pad(config.gripper.pad)
     return SuctionGripper(world, {1: body}, {1: item}, pad, config, mover)
 
@@ -74,6 +79,15 @@ def test_a_block_is_sealed_lifted_and_shaken(cache: Path) -> None:
     assert gripper.target == 1
     assert gripper.seal_pressure == pytest.approx(1.0, abs=1e-3)
     assert gripper.reached_quality == pytest.approx(1.0, abs=1e-3)
+    assert lifted(gripper)
+    gripper.shake()
+    assert gripper.lifted_m() >= 0.10
+
+
+def test_the_arm_lifts_the_same_block(cache: Path) -> None:
+    gripper = gripper_over(block(), cache, robot="iiwa14")
+    assert sealed(gripper)
+    assert gripper.seal_pressure == pytest.approx(1.0, abs=1e-2)
     assert lifted(gripper)
     gripper.shake()
     assert gripper.lifted_m() >= 0.10

@@ -1,0 +1,155 @@
+"""The gripper on a KUKA LBR iiwa 14 R820: SAPIEN's articulation, Pinocchio's inverse kinematics.
+
+Straight lines of the gripper become joint targets at every physics step; joints keep their range,
+speed and torque. Gravity is compensated, as the real arm's controller does. Links collide with
+objects and the table; with each other they do not.
+"""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import sapien
+from jaxtyping import Float
+
+from pipeline.config.evaluation import ArmConfig, HandConfig
+from pipeline.control.viewpoints import gripper_above
+from pipeline.errors import SoftgripError
+from pipeline.geometry.compiled_poses import pose_of
+from pipeline.geometry.transforms import invert
+from pipeline.simulation.engine import sapien_pose
+from pipeline.simulation.iiwa14 import AXES, GRIPPER_LINK, LIMITS_RAD, urdf
+
+_STIFFNESS, _DAMPING = 4e4, 4e3  # of the joints' position drives [N m/rad, N m s/rad]
+_SPEEDS = np.array([axis.speed_rad_s for axis in AXES])
+_MARGIN_RAD = 0.01  # kept from the ends of the joints' ranges
+_ELBOW_UP = np.array([0.0, 0.5, 0.0, -1.4, 0.0, 1.2, 0.0])
+_SEEDS = 12
+_HEADINGS = 8
+_ITERATIONS = 150
+_BY_ITSELF = [1, 1, 1, 0]  # shapes that share a bit of the third group do not collide
+
+
+class ArmMover:
+    """`pipeline.simulation.floating.Mover`: the arm beside the table."""
+
+    def __init__(self, world: sapien.Scene, hand: HandConfig, arm: ArmConfig) -> None:
+        self._world = world  # the articulation is the world's: it must outlive this
+        self._timestep_s = world.timestep
+        self._base = np.eye(4)
+        self._base[:3, 3] = arm.base_m
+        self._articulation = _loaded(world, hand)
+        self._articulation.root_pose = sapien_pose(self._base)
+        links = self._articulation.links
+        self._own = {link.entity.per_scene_id for link in links}
+        for link in links:
+            link.disable_gravity = True
+            for shape in link.collision_shapes:
+                shape.set_collision_groups(_BY_ITSELF)
+        self._pad = next(link for link in links if link.name == GRIPPER_LINK)
+        self._pad_index = links.index(self._pad)
+        self._joints = self._articulation.active_joints
+        for joint, axis in zip(self._joints, AXES, strict=True):
+            joint.set_drive_properties(_STIFFNESS, _DAMPING, force_limit=axis.torque_nm)
+        self._model = self._articulation.create_pinocchio_model()
+        rng = np.random.default_rng(0)
+        self._seeds = [_ELBOW_UP, *(rng.uniform(-0.8, 0.8, 7) * LIMITS_RAD for _ in range(_SEEDS))]
+        self._home_rad = self._most_comfortable(arm)
+        self.reset()
+
+    def reset(self) -> None:
+        """Home, at once."""
+        self._q_rad = self._home_rad.copy()
+        self._articulation.set_qpos(self._q_rad)
+        self._articulation.set_qvel(np.zeros(7))
+        self._to_drives(np.zeros(7))
+
+    def drive(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> bool:
+        """Joint targets a physics step nearer to the pose; False where the arm cannot follow."""
+        wanted = self._solution(world_from_gripper, self._q_rad)
+        if wanted is None:
+            self._to_drives(np.zeros(7))
+            return False
+        step = wanted - self._q_rad
+        most = float(np.max(np.abs(step) / (_SPEEDS * self._timestep_s)))
+        step /= max(most, 1.0)
+        self._q_rad = self._q_rad + step
+        self._to_drives(step / self._timestep_s)
+        return True
+
+    def pose(self) -> Float[np.ndarray, "4 4"]:
+        """world_from_gripper as the joints really are."""
+        placed = self._pad.entity_pose
+        return np.asarray(pose_of(placed.p.astype(np.float64), placed.q.astype(np.float64)))
+
+    def reachable(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> bool:
+        """Whether joints within their ranges reach the pose."""
+        return self.joints_at(world_from_gripper, self._q_rad) is not None
+
+    def owns(self, entity: sapien.Entity) -> bool:
+        """Any link."""
+        return entity.per_scene_id in self._own
+
+    def joints_at(
+        self, world_from_gripper: Float[np.ndarray, "4 4"], near_rad: Float[np.ndarray, " 7"]
+    ) -> Float[np.ndarray, " 7"] | None:
+        """Joint angles for a pose, sought from some angles first, then from elsewhere."""
+        for seed in (near_rad, *self._seeds):
+            found = self._solution(world_from_gripper, seed)
+            if found is not None:
+                return found
+        return None
+
+    def _most_comfortable(self, arm: ArmConfig) -> Float[np.ndarray, " 7"]:
+        """Joint angles at home farthest from the ends of their ranges; the pad's spin is free."""
+        found = []
+        for heading in np.arange(_HEADINGS) * 2 * np.pi / _HEADINGS:
+            x_axis = np.diag([1.0, 1.0, 1.0, 1.0])
+            x_axis[:2, 0] = [np.cos(heading), np.sin(heading)]
+            home = gripper_above(np.asarray(arm.home_m), 0.0, x_axis)
+            found += [self._solution(home, seed) for seed in self._seeds]
+        solved = [q for q in found if q is not None]
+        if not solved:
+            raise SoftgripError(
+                f"the arm at {arm.base_m} cannot hold its gripper at home, {arm.home_m}",
+                "Move evaluate.arm.base_m or evaluate.arm.home_m",
+            )
+        return max(solved, key=lambda q: float((1 - np.abs(q) / LIMITS_RAD).min()))
+
+    def joints_rad(self) -> Float[np.ndarray, " 7"]:
+        """Joint angles now."""
+        return np.asarray(self._articulation.qpos, dtype=np.float64)
+
+    def _solution(
+        self,
+        world_from_gripper: Float[np.ndarray, "4 4"],
+        seed_rad: Float[np.ndarray, " 7"],
+    ) -> Float[np.ndarray, " 7"] | None:
+        base_from_gripper = invert(self._base) @ world_from_gripper
+        found, solved, _ = self._model.compute_inverse_kinematics(
+            self._pad_index,
+            sapien_pose(base_from_gripper),
+            initial_qpos=seed_rad,
+            eps=1e-5,
+            max_iterations=_ITERATIONS,
+            dt=0.8,
+            damp=1e-5,
+        )
+        if not solved:
+            return None
+        q_rad = np.asarray((np.asarray(found) + np.pi) % (2 * np.pi) - np.pi)
+        return q_rad if bool((np.abs(q_rad) <= LIMITS_RAD - _MARGIN_RAD).all()) else None
+
+    def _to_drives(self, speed_rad_s: Float[np.ndarray, " 7"]) -> None:
+        for joint, q, rate in zip(self._joints, self._q_rad, speed_rad_s, strict=True):
+            joint.set_drive_target(q)
+            joint.set_drive_velocity_target(rate)
+
+
+def _loaded(world: sapien.Scene, hand: HandConfig) -> sapien.physx.PhysxArticulation:
+    loader = world.create_urdf_loader()
+    loader.fix_root_link = True
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "iiwa14.urdf"
+        path.write_text(urdf(hand))
+        return loader.load(str(path))
