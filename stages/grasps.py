@@ -61,7 +61,7 @@ from schemas.softgrip.v1.grasps_pb2 import GraspBatch
 from stages.graph import GRASPS, inputs_of
 
 TOPIC = "/grasps"
-RECORDED_SCENES = 6  # each costs its ray scene once more
+RECORDED_SCENES = 4  # each costs its ray scene once more
 ROUND = 512  # grasps labelled at once: bounds the memory of their rays
 
 

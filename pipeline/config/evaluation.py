@@ -124,6 +124,6 @@ class RecordingConfig(Section):
 
     objects: int = Field(60, ge=1, le=400, description="objects shown; up to 0.4 MB each")
     scenes: int = Field(40, ge=1, le=100, description="clutters shown; some 2 MB, three cameras")
-    grasps: int = Field(120, ge=1, le=800, description="grasps shown; some 0.2 MB each")
+    grasps: int = Field(60, ge=1, le=800, description="grasps shown; some 0.2 MB each")
     clouds: int = Field(100, ge=1, le=5000, description="clouds shown; some 0.02 MB each")
     attempts: int = Field(60, ge=1, le=200, description="attempts filmed; some 0.8 MB each")

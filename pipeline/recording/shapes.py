@@ -55,6 +55,7 @@ def _shaded(mesh: Mesh) -> Mesh:
     return Mesh(np.array(parted.vertices, dtype=np.float64), np.array(parted.faces, dtype=np.int64))
 
 
+@lru_cache(maxsize=256)
 def vertex_normals(mesh: Mesh) -> Float[np.ndarray, "n 3"]:
     """Area-weighted mean of the normals of the faces around each vertex."""
     corners = mesh.vertices_m[mesh.faces]
