@@ -59,7 +59,9 @@ class SampleBatches(Dataset[RawBatch]):
     """Item k: indices, clouds, masks and qualities of the samples ``batches[k]``."""
 
     def __init__(self, samples: GraspTensors, batches: list[Int[np.ndarray, " b"]]) -> None:
-        self._samples = samples
+        # Plain arrays over the same memory: indexing a np.memmap itself costs more.
+        self._cloud, self._mask = np.asarray(samples.cloud), np.asarray(samples.mask)
+        self._quality = np.asarray(samples.quality, dtype=np.float32)
         self._batches = batches
 
     def __len__(self) -> int:
@@ -69,21 +71,25 @@ class SampleBatches(Dataset[RawBatch]):
         indices = self._batches[number]
         return (
             torch.from_numpy(indices),
-            torch.from_numpy(np.asarray(self._samples.cloud[indices])),
-            torch.from_numpy(np.asarray(self._samples.mask[indices])),
-            torch.from_numpy(self._samples.quality[indices].astype(np.float32)),
+            torch.from_numpy(self._cloud[indices]),
+            torch.from_numpy(self._mask[indices]),
+            torch.from_numpy(self._quality[indices]),
         )
 
 
 def load_batches(
     samples: GraspTensors, batches: list[Int[np.ndarray, " b"]], workers: int, pinned: bool
-) -> DataLoader[RawBatch]:
+) -> Iterator[RawBatch]:
     """The batches in order, read by this process or ahead of it by ``workers`` others.
 
     pinned : batches are put where a GPU copies from fastest.
     """
-    return DataLoader(
-        SampleBatches(samples, batches),
+    items = SampleBatches(samples, batches)
+    if not workers and not pinned:
+        yield from map(items.__getitem__, range(len(items)))
+        return
+    yield from DataLoader(
+        items,
         batch_size=None,  # a batch is an item: it is gathered at once, not sample by sample
         num_workers=workers,
         pin_memory=pinned,
