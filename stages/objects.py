@@ -35,26 +35,53 @@ from pipeline.recording.recording import recording, spread
 from schemas.softgrip.v1.objects_pb2 import RefusedMesh
 from stages.graph import OBJECTS, inputs_of
 
+Source = tuple[Path | None, str]  # a mesh file, or None for an embedded object, and its name
+
 
 def build(stage: StageContext) -> Summary:
     """Turn meshes into the object catalogue: repair, rescale, NSVR, convex parts, split."""
     config, seed = stage.config.objects, stage.config.seed
-    measured, refused = measure(stage)
-    classes = {item.source.name: item.shape_class for item in measured}
+    jobs, added = sources(stage)
+    measured, refused = measure(stage, jobs)
+    classes = {
+        item.source.name: item.shape_class for item in measured if item.source.name not in added
+    }
     if not classes:
         raise MeshError("Not one mesh could be used", "See the reasons above, or unset MESH_DIR")
-    check_transparent(config, sorted(classes))
+    check_transparent(config, sorted({*classes, *added}))
     chosen = choose_subset(classes, config.limit, seed)
+    split = choose_split({name: classes[name] for name in chosen}, stage.config.split, seed)
+    split |= dict.fromkeys(added, "train")
     cache = stage.folder.path.parent / ".cache" / "convex_parts"
     finish = partial(finished, config=config, seed=seed, cache=cache)
-    todo = [item for item in measured if item.source.name in set(chosen)]
+    todo = [item for item in measured if item.source.name in split]
     results = run_in_order(finish, todo, stage.workers, stage.executor)
     objects = list(progress(results, len(todo), "objects: convex parts", "object"))
-    split = choose_split(
-        {item.name: item.shape_class for item in objects}, stage.config.split, seed
-    )
     publish(stage, objects, dict(split), refused)
     return summary(objects, dict(split), refused)
+
+
+def sources(stage: StageContext) -> tuple[list[Source], frozenset[str]]:
+    """Every source, and the names of the embedded ones that meshes are trained beside.
+
+    Raises MeshError where a mesh has the name of an embedded object that would stand beside it.
+    """
+    embedded: list[Source] = [(None, name) for name in sorted(PARAMETRIC_OBJECTS)]
+    folder = stage.mesh_dir
+    if folder is None:
+        return embedded, frozenset()
+    paths = [path for name, path in stage.inputs.items() if name.startswith("meshes/")]
+    names = object_names(standalone(paths, folder), folder)
+    meshes: list[Source] = [(path, name) for path, name in names.items()]
+    if not stage.config.objects.embedded_in_training:
+        return meshes, frozenset()
+    for path, name in names.items():
+        if name in PARAMETRIC_OBJECTS:
+            raise MeshError(
+                f"{path} has the name of an embedded object",
+                "Rename the file, or set objects.embedded_in_training = false",
+            )
+    return meshes + embedded, frozenset(PARAMETRIC_OBJECTS)
 
 
 def check_transparent(config: ObjectsConfig, names: list[str]) -> None:
@@ -68,15 +95,11 @@ def check_transparent(config: ObjectsConfig, names: list[str]) -> None:
             )
 
 
-def measure(stage: StageContext) -> tuple[list[MeasuredObject], list[RefusedMesh]]:
+def measure(
+    stage: StageContext, jobs: list[Source]
+) -> tuple[list[MeasuredObject], list[RefusedMesh]]:
     """Load, repair and measure every source; what is refused is named, the others go on."""
-    paths = [path for name, path in stage.inputs.items() if name.startswith("meshes/")]
-    folder = stage.mesh_dir
-    jobs: list[tuple[Path | None, str]] = [(None, name) for name in sorted(PARAMETRIC_OBJECTS)]
-    if folder is not None:
-        names = object_names(standalone(paths, folder), folder)
-        jobs = [(path, name) for path, name in names.items()]
-    job = partial(measured_or_refused, config=stage.config.objects, folder=folder)
+    job = partial(measured_or_refused, config=stage.config.objects, folder=stage.mesh_dir)
     results = run_in_order(job, jobs, stage.workers, stage.executor)
     measured, refused = [], []
     for result in progress(results, len(jobs), "objects: repair and NSVR", "mesh"):
@@ -89,7 +112,7 @@ def measure(stage: StageContext) -> tuple[list[MeasuredObject], list[RefusedMesh
 
 
 def measured_or_refused(
-    job: tuple[Path | None, str], config: ObjectsConfig, folder: Path | None
+    job: Source, config: ObjectsConfig, folder: Path | None
 ) -> MeasuredObject | RefusedMesh:
     """One source measured, or why it cannot be."""
     path, name = job

@@ -27,6 +27,9 @@ class ObjectsConfig(Section):
     """Mesh intake: units, repair bounds, rescaling, physical properties."""
 
     limit: int = Field(0, ge=0, description="most objects taken, spread over classes; 0 = all")
+    embedded_in_training: bool = Field(
+        False, description="with MESH_DIR: train on the embedded objects too, test on meshes alone"
+    )
     unit: Literal["auto", "m", "cm", "mm", "in"] = Field(
         "auto", description="length unit of mesh files that do not declare one; auto = by extent"
     )

@@ -1,0 +1,73 @@
+"""Which objects a catalogue takes: meshes, embedded objects, and both."""
+
+from pathlib import Path
+
+import pytest
+import trimesh
+
+from pipeline.artifacts.object_messages import read_objects
+from pipeline.errors import MeshError
+from pipeline.execution import RunFolder, StageContext
+from pipeline.execution.running import stage_context
+from pipeline.geometry.parametric import PARAMETRIC_OBJECTS
+from stages import objects
+from stages.graph import OBJECTS, inputs_of
+
+BESIDE = """
+[objects]
+limit = 6
+embedded_in_training = true
+[objects.convex]
+input_faces = 200
+"""
+
+
+@pytest.fixture
+def mesh_dir(tmp_path: Path) -> Path:
+    folder = tmp_path / "meshes"
+    folder.mkdir()
+    for number in range(7):
+        shape = trimesh.creation.box(extents=(0.1, 0.08 + 0.01 * number, 0.05))
+        shape.export(folder / f"box_{number}.ply")
+    return folder
+
+
+def context(tmp_path: Path, mesh_dir: Path | None, config: str) -> StageContext:
+    folder = RunFolder(tmp_path / "runs" / "one")
+    folder.path.mkdir(parents=True)
+    folder.config.write_text(config)
+    return stage_context(OBJECTS, folder, inputs_of, mesh_dir, workers=1)
+
+
+def test_embedded_objects_stand_beside_meshes_in_training_alone(
+    tmp_path: Path, mesh_dir: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    few = dict(sorted(PARAMETRIC_OBJECTS.items())[:3])
+    monkeypatch.setattr(objects, "PARAMETRIC_OBJECTS", few)
+    stage = context(tmp_path, mesh_dir, BESIDE)
+    made = objects.build(stage)
+    split = {name: where for name, (_, where) in read_objects(stage.output).items()}
+    assert {name for name in split if name in few} == set(few)
+    assert {split[name] for name in few} == {"train"}
+    boxes = [where for name, where in split.items() if name.startswith("box_")]
+    assert len(boxes) == 6  # the limit is on meshes
+    assert set(boxes) == {"train", "val", "test"}
+    assert made["objects"] == 9
+
+
+def test_a_run_takes_meshes_or_embedded_objects_unless_told_otherwise(
+    tmp_path: Path, mesh_dir: Path
+) -> None:
+    jobs, added = objects.sources(context(tmp_path / "a", mesh_dir, ""))
+    assert sorted(name for _, name in jobs) == [f"box_{number}" for number in range(7)]
+    assert not added
+    jobs, added = objects.sources(context(tmp_path / "b", None, BESIDE))
+    assert {name for _, name in jobs} == set(PARAMETRIC_OBJECTS)
+    assert not added
+
+
+def test_a_mesh_of_an_embedded_objects_name_is_an_error(tmp_path: Path, mesh_dir: Path) -> None:
+    taken = next(iter(PARAMETRIC_OBJECTS))
+    (mesh_dir / "box_0.ply").rename(mesh_dir / f"{taken}.ply")
+    with pytest.raises(MeshError, match=rf"{taken}\.ply has the name of an embedded object"):
+        objects.sources(context(tmp_path, mesh_dir, BESIDE))
