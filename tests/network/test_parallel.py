@@ -32,11 +32,12 @@ def test_two_processes_and_their_loaders_give_the_curve_of_one(tmp_path: Path) -
         timeout=300,
     )
     assert done.returncode == 0, done.stderr[-3000:]
-    seen = [json.loads((together / f"history-{rank}.json").read_text()) for rank in range(2)]
-    assert seen[0] == seen[1]
-    alone = trained_in(tmp_path / "alone", loader_workers=0)
-    assert len(seen[0]) == len(alone.history)
-    for ours, theirs in zip(seen[0], alone.history, strict=True):
+    seen = [json.loads((together / f"seen-{rank}.json").read_text()) for rank in range(2)]
+    assert seen[0]["history"] == seen[1]["history"]
+    # The norm and its gradient, on the two parts of a batch, are those of the whole.
+    assert max(each["norm_difference"] for each in seen) < 1e-5
+    alone = trained_in(tmp_path / "alone", ALONE, loader_workers=0)
+    for ours, theirs in zip(seen[0]["history"], alone.history, strict=True):
         assert ours["samples"] == theirs.samples == SAMPLES
         # Rounding alone separates them, and grows from step to step.
         assert ours["train_loss"] == pytest.approx(theirs.train_loss, rel=2e-3)
