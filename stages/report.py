@@ -9,11 +9,12 @@ from typing import Annotated, Any
 import typer
 from loguru import logger
 
-from pipeline.artifacts import open_artifact, package_version, publish_bytes
+from pipeline.artifacts import Provenance, open_artifact, package_version, publish_bytes
 from pipeline.artifacts.object_messages import read_objects
 from pipeline.config import RunConfig, load_run_config
 from pipeline.errors import ArtifactError, SoftgripError
 from pipeline.execution import RunFolder
+from pipeline.execution.freshness import content_digests
 from pipeline.reporting import plots
 from pipeline.reporting.facts import (
     CatalogueFacts,
@@ -65,6 +66,7 @@ def make_report(folder: RunFolder) -> Path:
             "version": package_version(),
             "headline": headline(summaries),
             "provenance": provenance,
+            "mixed": mixed_parts(folder, provenance),
             "missing": [(n, GOALS.get(n, n)) for n in names if summaries[n] is None],
             "catalogue": catalogue,
             "classes": dict(sorted(Counter(o.shape_class for o in catalogue.objects).items())),
@@ -107,6 +109,18 @@ def headline(summaries: dict[str, dict[str, Any] | None]) -> str:
         lifted, attempts = (sum(r[key] for r in levels) for key in ("lifted", "attempts"))
         parts.append(f"{lifted} of {attempts} attempts lifted an object in closed loop")
     return "; ".join(parts) + "." if parts else "Objects alone so far."
+
+
+def mixed_parts(folder: RunFolder, provenance: list[Provenance]) -> list[str]:
+    """What was made from another state of an artifact than the one that lies there now."""
+    there = {path.name: path for path in map(folder.artifact, MADE) if path.is_file()}
+    now = content_digests(there, folder.state("hashes.json"))
+    return [
+        f"{origin.stage} was made from another {used.path}"
+        for origin in provenance
+        for used in origin.inputs
+        if now.get(used.path, used.sha256) != used.sha256
+    ]
 
 
 def words_on_meshes(

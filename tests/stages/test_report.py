@@ -3,14 +3,17 @@
 import json
 import re
 import shutil
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
+from pipeline.artifacts import ArtifactWriter, open_artifact
 from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder
+from schemas.softgrip.v1.grasps_pb2 import ShardIndex
 from stages.report import make_report
 
 
@@ -108,6 +111,19 @@ def test_what_is_missing_is_said_with_its_command(run: RunFolder, tmp_path: Path
     folder.summary("objects").unlink()
     with pytest.raises(ArtifactError, match="make dataset RUN=half"):
         make_report(folder)
+
+
+def test_parts_of_different_states_are_told_apart(copied: RunFolder) -> None:
+    assert "do not belong together" not in page_of(copied).words
+    shards = copied.artifact("shards")
+    before = shards.read_bytes()
+    with open_artifact(shards) as artifact:
+        origin, index = artifact.provenance, artifact.one(ShardIndex)
+    with ArtifactWriter(shards, replace(origin, seed=origin.seed + 1)) as written:
+        written.write("/index", index, log_time_ns=0)
+    make_report(copied)
+    assert "train was made from another shards.mcap" in page_of(copied).words
+    shards.write_bytes(before)
 
 
 def test_a_sweep_and_baselines_are_shown(copied: RunFolder) -> None:
