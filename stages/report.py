@@ -22,17 +22,18 @@ from pipeline.reporting.facts import (
     read_catalogue,
     read_failures,
     read_origins,
+    read_success,
     read_summary,
     read_training,
 )
 from pipeline.reporting.failures import failure_picture
 from pipeline.reporting.page import html_page, markdown_page
+from schemas.softgrip.v1.evaluation_pb2 import LevelResult
 from schemas.softgrip.v1.scenes_pb2 import Scene
 from stages.graph import MADE, RUNS_DIR, SWEEP
 
 GOALS = {"evaluate": "eval"}  # what `make` calls a stage, where it is another word
 FAILURES = 8
-FIRST_POLICY = "GA-CNN"  # of an evaluation without baselines
 FIGURES = "report"
 
 
@@ -52,8 +53,9 @@ def make_report(folder: RunFolder) -> Path:
             f"{folder.summary('objects')} is missing", f"Make it first: make dataset RUN={run}"
         )
     catalogue = read_catalogue(folder.artifact("objects"))
-    files = figures_of(folder, summaries, catalogue)
-    failures = failures_of(folder, config, files) if summaries["evaluate"] else []
+    success = read_success(folder.artifact("evaluate")) if summaries["evaluate"] else {}
+    files = figures_of(folder, summaries, catalogue, success)
+    failures = failures_of(folder, config, next(iter(success)), files) if success else []
     provenance = read_origins([folder.artifact(name) for name in names])
     meshes, licence, licence_text = words_on_meshes(folder, config, catalogue)
     title = config.dataset.title or f"softgrip, run {run}"
@@ -78,7 +80,7 @@ def make_report(folder: RunFolder) -> Path:
             "figures": {Path(path).stem for path in files},
             "figure": lambda name: f"{FIGURES}/{name}.svg",
             "not_yet": lambda what, goal: f"Not made yet: `make {goal} RUN={run}`.",
-            "success": success_tables(summaries["evaluate"]),
+            "success": success,
             "overall": overall_rates(summaries["evaluate"]),
             "comparisons": (summaries["evaluate"] or {}).get("comparisons", {}),
             "failures": failures,
@@ -142,7 +144,10 @@ def words_on_meshes(
 
 
 def figures_of(
-    folder: RunFolder, summaries: dict[str, dict[str, Any] | None], catalogue: CatalogueFacts
+    folder: RunFolder,
+    summaries: dict[str, dict[str, Any] | None],
+    catalogue: CatalogueFacts,
+    success: dict[str, dict[int, LevelResult]],
 ) -> dict[str, bytes]:
     """Path in the run → SVG of every figure that the run has numbers for."""
     nsvr = {item.name: item.nsvr for item in catalogue.objects}
@@ -170,20 +175,12 @@ def figures_of(
             if network["group"] == "family"
         ]
         svg["fig-1"] = plots.fig_1(members, sweep["budget"]["mean_predictor_mae"])
-    if evaluate := summaries["evaluate"]:
-        svg["success"] = plots.success_by_level(rates_by_level(evaluate))
+    if success:
+        svg["success"] = plots.success_by_level(rates(success))
     svg["timings"] = plots.wall_times(
         {name: found["wall_time_s"] for name, found in summaries.items() if found}
     )
     return {f"{FIGURES}/{name}.svg": text.encode() for name, text in svg.items()}
-
-
-def success_tables(evaluate: dict[str, Any] | None) -> dict[str, dict[str, Any]]:
-    """Policy → level → the figures of its row; levels are broken down for the first policy."""
-    if evaluate is None:
-        return {}
-    first = next(iter(evaluate.get("policies", {FIRST_POLICY: {}})))
-    return {first: {level: row(r) for level, r in evaluate["success_by_level"].items()}}
 
 
 def overall_rates(evaluate: dict[str, Any] | None) -> dict[str, Any]:
@@ -197,27 +194,21 @@ def row(figures: dict[str, Any]) -> dict[str, Any]:
     return {**figures, "low": low, "high": high}
 
 
-def rates_by_level(evaluate: dict[str, Any]) -> dict[str, dict[int, plots.Rate]]:
-    """Policy → level → rate; baselines, whose levels have no interval, as bare rates."""
-    first = next(iter(evaluate.get("policies", {FIRST_POLICY: {}})))
-    rates = {
-        first: {
-            int(level): plots.Rate(r["rate"], *r["interval_95"])
-            for level, r in evaluate["success_by_level"].items()
+def rates(results: dict[str, dict[int, LevelResult]]) -> dict[str, dict[int, plots.Rate]]:
+    """Policy → level → rate and interval."""
+    return {
+        policy: {
+            level: plots.Rate(r.success_rate, r.interval_low, r.interval_high)
+            for level, r in by_level.items()
         }
+        for policy, by_level in results.items()
     }
-    for policy, r in evaluate.get("policies", {}).items():
-        if policy != first:
-            rates[policy] = {
-                int(level): plots.Rate(rate, rate, rate) for level, rate in r["by_level"].items()
-            }
-    return rates
 
 
 def failures_of(
-    folder: RunFolder, config: RunConfig, files: dict[str, bytes]
+    folder: RunFolder, config: RunConfig, policy: str, files: dict[str, bytes]
 ) -> list[dict[str, Any]]:
-    """Some failed attempts; their pictures are added to ``files``."""
+    """Some failed attempts of a policy; their pictures are added to ``files``."""
     objects = {name: item for name, (item, _) in read_objects(folder.artifact("objects")).items()}
     with open_artifact(folder.artifact("scenes")) as artifact:
         names = {
@@ -225,7 +216,7 @@ def failures_of(
             for _, scene in artifact.messages(Scene)
         }
     found = []
-    for number, attempt in enumerate(read_failures(folder.artifact("evaluate"), FAILURES)):
+    for number, attempt in enumerate(read_failures(folder.artifact("evaluate"), policy, FAILURES)):
         bodies, radius = names[attempt.scene_id], config.gripper.pad.radius_m
         jpeg = failure_picture(attempt, bodies, objects, config.scenes, radius)
         path = f"{FIGURES}/failure-{number}.jpg" if jpeg else ""

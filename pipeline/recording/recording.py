@@ -5,6 +5,7 @@ Entity paths and the timeline are named alike across stages, and a test holds ev
 - ``/world``: what has a place in space, in metres, z up. Things that come and go lie at
   ``/world/<kind>/<step>/<thing>`` (see `numbered`), a camera and its pictures at
   ``/world/<camera>/colour``, ``depth``, ``segmentation`` and ``normals``.
+- ``/camera/<name>``: pictures that have no place in a scene that is shown.
 - ``/curves/<quantity>/<curve>``: figures, as curves over the timeline or as bars.
 - ``/notes/<subject>``: words, as Markdown.
 - One timeline a recording, of whole numbers from 0, named by what it steps through:
@@ -27,7 +28,7 @@ from pipeline.artifacts.publishing import published
 from pipeline.recording.cost import recording_cost
 
 APPLICATION = "softgrip"
-ROOTS = ("world", "curves", "notes")
+ROOTS = ("world", "camera", "curves", "notes")
 TIMELINES = {
     "objects": "object",
     "scenes": "scene",

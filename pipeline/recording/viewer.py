@@ -3,6 +3,8 @@
 import socket
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -23,7 +25,7 @@ _TRIES = 3  # beyond the first; the viewer gives up on a picture after some seco
 class Sight:
     """What a person sees who opens a recording.
 
-    window_png, view_png : the whole window, and each view by its name.
+    window_png, view_png : the whole window, and each view by its name, those behind tabs left out.
     problems : what the viewer could not show, and why.
     timeline : the timeline it opens on.
     """
@@ -64,11 +66,11 @@ def sight_of(recording: Path, step: int | None = None) -> Sight:
             client.set_time(sequence=step)
         window = _settled(client, recording)
         state = client.get_state()
-        views = {
-            view.name or view.origin: _screenshot(client, view.view_id)
-            for view in state.views
-            if view.visible
-        }
+        views = {}
+        for view in state.views:
+            if view.visible:
+                with _behind_a_tab():
+                    views[view.name or view.origin] = _screenshot(client, view.view_id)
         problems = tuple(
             f"{view.name}: {report}" for view in state.views for report in view.reports
         )
@@ -90,6 +92,16 @@ def _settled(client: ViewerClient, recording: Path) -> bytes:
         f"{recording} did not stand still in the viewer for {_PATIENCE_S:.0f} s",
         "Open it by hand: .venv/bin/rerun with its path",
     )
+
+
+@contextmanager
+def _behind_a_tab() -> Iterator[None]:
+    """A view behind another one's tab is called visible, and cannot be photographed."""
+    try:
+        yield
+    except ConnectionError as error:
+        if "NotFound" not in str(error):
+            raise
 
 
 def _screenshot(client: ViewerClient, view_id: str | None = None) -> bytes:

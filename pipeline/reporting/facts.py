@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.artifacts import Provenance, from_tensor, open_artifact, read_provenance
 from pipeline.errors import ArtifactError
-from schemas.softgrip.v1.evaluation_pb2 import Attempt
+from schemas.softgrip.v1.evaluation_pb2 import Attempt, LevelResult
 from schemas.softgrip.v1.objects_pb2 import CatalogueObject, RefusedMesh
 from schemas.softgrip.v1.training_pb2 import Epoch, TrainingResult
 
@@ -98,12 +98,21 @@ def read_training(path: Path) -> TrainingFacts:
     )
 
 
-def read_failures(path: Path, at_most: int) -> list[Attempt]:
-    """Failed attempts of an evaluate artifact: of every cause in turn, the first policy's first."""
+def read_success(path: Path) -> dict[str, dict[int, LevelResult]]:
+    """Policy → level → result, the run's own policy first, its baselines after it."""
+    found: dict[str, dict[int, LevelResult]] = {}
+    with open_artifact(path) as artifact:
+        for _, result in artifact.messages(LevelResult, "/levels"):
+            found.setdefault(result.policy, {})[result.level] = result
+    return found
+
+
+def read_failures(path: Path, policy: str, at_most: int) -> list[Attempt]:
+    """Failed attempts of a policy in an evaluate artifact, of every cause in turn."""
     by_cause: dict[str, list[Attempt]] = {}
     with open_artifact(path) as artifact:
         for _, attempt in artifact.messages(Attempt):
-            if attempt.outcome != "lifted":
+            if attempt.outcome != "lifted" and attempt.policy == policy:
                 by_cause.setdefault(attempt.cause, []).append(attempt)
     chosen: list[Attempt] = []
     while len(chosen) < at_most and any(by_cause.values()):

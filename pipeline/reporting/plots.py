@@ -177,7 +177,7 @@ def success_by_level(rates: Mapping[str, Mapping[int, Rate]]) -> str:
                 color=_rgb(PALETTE[(4, 5, 2, 6, 0, 1)[number % 6]]),
                 capsize=2,
                 ms=5,
-                label=policy,
+                label=policy or "closed loop",
             )
         levels = sorted({level for by_level in rates.values() for level in by_level})
         axes.set_xticks(levels)
