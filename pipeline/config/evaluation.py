@@ -88,7 +88,7 @@ class PolicyConfig(Section):
         15.0, gt=0, description="contact force that stops the approach [N]"
     )
     tension_min_n: float = Field(
-        0.02, gt=0, description="least pull on the base that tells a held object [N]"
+        0.003, gt=0, description="least pull on the base that tells a held object: 0.3 g [N]"
     )
     slip_m: float = Field(
         0.008, gt=0, description="shift of the load's line in one step that is a slip [m]"

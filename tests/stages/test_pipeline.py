@@ -11,7 +11,7 @@ from pipeline.artifacts import open_artifact, read_provenance
 from pipeline.artifacts.object_messages import read_objects
 from pipeline.artifacts.scene_messages import read_scenes
 from pipeline.execution import RunFolder
-from schemas.softgrip.v1.evaluation_pb2 import Attempt, LevelResult
+from schemas.softgrip.v1.evaluation_pb2 import Attempt, Comparison, LevelResult
 from schemas.softgrip.v1.training_pb2 import TrainingResult
 from stages.graph import STAGES
 from stages.shards import read_split
@@ -84,10 +84,22 @@ def test_training_and_evaluation_report_what_they_did(run: RunFolder) -> None:
     assert 0 < result.test_mae < 1
     with open_artifact(run.artifact("evaluate")) as artifact:
         attempts = [message for _, message in artifact.messages(Attempt)]
-        (level,) = (message for _, message in artifact.messages(LevelResult))
-    assert level.attempts == len(attempts) <= 2
-    assert level.lifted == sum(made.outcome == "lifted" for made in attempts)
-    assert level.lifted + sum(level.failures.values()) == level.attempts
+        levels = [message for _, message in artifact.messages(LevelResult, "/levels")]
+        overall = [message for _, message in artifact.messages(LevelResult, "/policies")]
+        comparisons = [message for _, message in artifact.messages(Comparison)]
+    assert [level.policy for level in levels] == ["closed-loop", "open-loop", "geometric"]
+    assert [c.baseline for c in comparisons] == ["open-loop", "geometric"]
+    for level, whole in zip(levels, overall, strict=True):
+        mine = [made for made in attempts if made.policy == level.policy]
+        assert level.attempts == whole.attempts == len(mine) <= 2
+        assert level.lifted == sum(made.outcome == "lifted" for made in mine)
+        assert level.lifted + sum(level.failures.values()) == level.attempts
+        assert all(len(made.states) == made.time_s.shape[0] for made in mine)
+    text = (run.path / "evaluate.md").read_text()
+    assert all(level.policy in text for level in levels)
+    summary = json.loads(run.summary("evaluate").read_text())
+    assert summary["success_by_level"]["1"]["lifted"] == levels[0].lifted
+    assert set(summary["comparisons"]["open-loop"]) >= {"p_paired", "p_fisher"}
 
 
 def test_a_stage_without_its_input_says_which_and_how(tmp_path: Path) -> None:
