@@ -121,6 +121,11 @@ lint: .venv/.ready
 	$(PY) -m mypy
 	$(PY) -m schemas.generate --check
 
+# Run ci on the embedded objects, whatever MESH_DIR says: they are the same everywhere.
+regress:  ## run ci held against its reference; ACCEPT=1 renews the reference
+	@$(MAKE) --no-print-directory runs/ci/evaluate.mcap RUN=ci MESH_DIR=
+	@$(PY) -m stages.regress $(if $(ACCEPT),--accept)
+
 SECONDS_A_READER ?= 60
 fuzz: .venv/.ready  ## coverage-guided fuzzing of the readers, SECONDS_A_READER each
 	@for reader in mesh toml mcap checkpoint; do \

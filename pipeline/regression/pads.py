@@ -1,0 +1,33 @@
+"""A fixed small shard of pads over surfaces, whose labels no renderer and no physics decide."""
+
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from pipeline.artifacts import ArtifactWriter, Provenance, from_tensor, open_artifact, to_tensor
+from pipeline.config import GripperConfig
+from pipeline.gripper import LabelBatch, build_pad, label_batch
+from schemas.softgrip.v1.tensor_pb2 import Tensor
+
+HEIGHTS, ON_TARGET = "/heights_m", "/on_target"
+
+
+def write_pads(
+    path: Path,
+    provenance: Provenance,
+    heights_m: Float[np.ndarray, "n v"],
+    on_target: Bool[np.ndarray, "n v"],
+) -> None:
+    """Keep what lies under each vertex of each pad; single precision is exact to 1e-9 m here."""
+    with ArtifactWriter(path, provenance) as artifact:
+        artifact.write(HEIGHTS, to_tensor(heights_m.astype(np.float32)), log_time_ns=0)
+        artifact.write(ON_TARGET, to_tensor(on_target.astype(np.uint8)), log_time_ns=0)
+
+
+def labelled_pads(path: Path, config: GripperConfig) -> LabelBatch:
+    """S-1.07 - S-1.12 on every pad of the shard, with Table I's pad."""
+    with open_artifact(path) as artifact:
+        (heights,) = (from_tensor(m) for _, m in artifact.messages(Tensor, HEIGHTS))
+        (target,) = (from_tensor(m) for _, m in artifact.messages(Tensor, ON_TARGET))
+    return label_batch(build_pad(config.pad), config, heights.astype(np.float64), target == 1)

@@ -1,0 +1,103 @@
+"""`make regress`: run `ci` held against the committed reference, each difference in words.
+
+`make regress ACCEPT=1` takes the run's figures as the new reference; commit it with the reason.
+"""
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from loguru import logger
+
+from pipeline.artifacts import publish_bytes, read_provenance
+from pipeline.artifacts.object_messages import read_objects
+from pipeline.artifacts.scene_messages import read_scenes
+from pipeline.config import load_run_config
+from pipeline.errors import ArtifactError, SoftgripError
+from pipeline.execution import RunFolder, generator
+from pipeline.gripper.heights import pad_heights
+from pipeline.regression.comparison import Figures, compared_count, differences
+from pipeline.regression.figures import figures_of
+from pipeline.regression.pads import write_pads
+from stages.graph import RUNS_DIR
+from stages.grasps import label_rounds, pad_of, ray_scene, visible_surface
+
+REFERENCE = Path("tests/regression/reference.json")
+PADS = Path("tests/regression/pads.mcap")
+PADS_A_SCENE = 24
+EXIT_DIFFERENT = 1
+
+
+def main(
+    run: Annotated[str, typer.Option(help="a finished run")] = "ci",
+    runs_dir: Annotated[Path, typer.Option(help="folder of all runs")] = RUNS_DIR,
+    reference: Annotated[Path, typer.Option(help="what it is held against")] = REFERENCE,
+    accept: Annotated[bool, typer.Option(help="take the run's figures as reference")] = False,
+    new_pads: Annotated[bool, typer.Option(help="draw the fixed pads anew from the run")] = False,
+) -> None:
+    """Compare a run with the reference; non-zero where something moved further than it may."""
+    folder = RunFolder(runs_dir / run)
+    if new_pads:
+        draw_pads(folder, PADS)
+    now = figures_of(folder, PADS)
+    before: Figures = {} if accept and not reference.is_file() else read_reference(reference)
+    found = list(differences(now, before))
+    for difference in found:
+        sys.stdout.write(f"{difference}\n")
+    if accept:
+        publish_bytes(reference, (json.dumps(now, indent=1, ensure_ascii=False) + "\n").encode())
+        sys.stdout.write(f"{len(found)} differences accepted: commit {reference} with the reason\n")
+        return
+    sys.stdout.write(f"{compared_count(now)} quantities compared, {len(found)} differ\n")
+    if found:
+        sys.stdout.write("If this is meant: make regress ACCEPT=1\n")
+        raise typer.Exit(EXIT_DIFFERENT)
+
+
+def read_reference(path: Path) -> Figures:
+    """The committed figures.
+
+    Raises
+    ------
+    ArtifactError : there are none.
+    """
+    if not path.is_file():
+        raise ArtifactError(f"{path} does not exist", "Make it: make regress ACCEPT=1")
+    figures: Figures = json.loads(path.read_text())
+    return figures
+
+
+def draw_pads(folder: RunFolder, path: Path) -> None:
+    """Pads on objects of every scene, from good to bad, with what lies under their vertices."""
+    config = load_run_config(folder.config)
+    objects = read_objects(folder.artifact("objects"))
+    meshes = {name: item.mesh for name, (item, _) in objects.items()}
+    pad = pad_of(config)
+    heights, targets = [], []
+    for scene in read_scenes(folder.artifact("scenes")):
+        rays, body_ids = ray_scene(scene, meshes, config)
+        surface = visible_surface(scene.views[0], rays, body_ids)
+        rng = generator(config.seed, "pads", scene.scene_id)
+        candidates, labels = label_rounds(surface, rays, body_ids, config, 512, rng)
+        ranked = np.argsort(labels.q, kind="stable")
+        chosen = ranked[np.linspace(0, len(ranked) - 1, PADS_A_SCENE).astype(int)]
+        frames = candidates.world_from_contact[chosen]
+        found, below = pad_heights(frames, rays, pad, config.grasps.clearance_m)
+        heights.append(found)
+        targets.append((body_ids[below] == candidates.body_id[chosen, None]) & (below >= 0))
+    made = replace(read_provenance(folder.artifact("scenes")), stage="regress", inputs=())
+    write_pads(path, made, np.concatenate(heights), np.concatenate(targets))
+
+
+if __name__ == "__main__":
+    logger.remove()
+    logger.add(sys.stderr, level="INFO", format="{message}")
+    try:
+        typer.run(main)
+    except SoftgripError as error:
+        logger.error("{}", error)
+        sys.exit(EXIT_DIFFERENT)
