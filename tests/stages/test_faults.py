@@ -26,6 +26,7 @@ from tests.stages.test_pipeline import digests
 FAILURE, INTERRUPTED = 1, 130
 # Room for what a stage reads and a little more, not for what it writes.
 LITTLE_BYTES = 40 << 10
+PAGE_BYTES = 4096
 # Stages that go on after a full disk in these tests; the others cost more and do the same.
 RESUMED = ("grasps", "shards")
 
@@ -67,7 +68,9 @@ def with_convex_parts(run: RunFolder, runs: Path) -> None:
 
 
 def size_of(folder: Path) -> int:
-    return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
+    """What the files take where each begins on a page of its own."""
+    sizes = [path.stat().st_size for path in folder.rglob("*") if path.is_file()]
+    return sum(-(-size // PAGE_BYTES) * PAGE_BYTES for size in sizes)
 
 
 def of_stage(run: RunFolder, stage: str) -> dict[str, str]:
