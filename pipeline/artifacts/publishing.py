@@ -10,6 +10,9 @@ from pathlib import Path
 from pipeline.errors import ArtifactError
 
 HASH_BLOCK_BYTES = 1 << 20
+FULL = (errno.ENOSPC, errno.EDQUOT)
+FORBIDDEN = (errno.EACCES, errno.EPERM, errno.EROFS)
+CANNOT_WRITE = FULL + FORBIDDEN
 
 
 @contextmanager
@@ -31,7 +34,7 @@ def published(path: Path) -> Iterator[Path]:
         scratch.replace(path)
         _flush_folder(path.parent)
     except OSError as error:
-        raise _explained(path, error) from error
+        raise write_error(path, error) from error
     finally:
         scratch.unlink(missing_ok=True)
 
@@ -51,22 +54,14 @@ def file_sha256(path: Path) -> str:
     return digest.hexdigest()
 
 
-def _flush_folder(folder: Path) -> None:
-    """Make the rename itself durable."""
-    handle = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
-
-
-def _explained(path: Path, error: OSError) -> ArtifactError:
-    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+def write_error(path: Path, error: OSError) -> ArtifactError:
+    """What the system says of a file that could not be written, with what to do about it."""
+    if error.errno in FULL:
         return ArtifactError(
             f"{path} could not be written: the disk is full",
             "Free some space and run the same command again; finished shards are kept",
         )
-    if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
+    if error.errno in FORBIDDEN:
         return ArtifactError(
             f"{path} could not be written: {error.strerror}",
             f"Make {path.parent} writable and run the same command again",
@@ -74,3 +69,12 @@ def _explained(path: Path, error: OSError) -> ArtifactError:
     return ArtifactError(
         f"{path} could not be written: {error}", "Mend this and run the same command again"
     )
+
+
+def _flush_folder(folder: Path) -> None:
+    """Make the rename itself durable."""
+    handle = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)

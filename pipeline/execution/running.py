@@ -17,6 +17,7 @@ from filelock import FileLock, Timeout
 from loguru import logger
 
 from pipeline.artifacts import open_artifact, publish_bytes, read_provenance
+from pipeline.artifacts.publishing import CANNOT_WRITE, write_error
 from pipeline.config import load_run_config
 from pipeline.errors import ArtifactError, ConfigError, SoftgripError
 from pipeline.execution.executors import Executor
@@ -208,15 +209,16 @@ def _readable_failures(stage: Stage, folder: RunFolder, rank: int) -> Iterator[N
         _trace(error)
         raise SystemExit(EXIT_INTERRUPTED) from None
     except Exception as error:  # noqa: BLE001 - the last line of defence, told and logged
-        logger.error(
-            "{}: unexpected {}: {}. The trace is in {}",
-            stage.name,
-            type(error).__name__,
-            error,
-            log,
-        )
+        logger.error("{}: {}", stage.name, _told(error, folder, log))
         _trace(error)
         raise SystemExit(EXIT_FAILURE) from None
+
+
+def _told(error: Exception, folder: RunFolder, log: Path) -> str:
+    """A failure that no stage explained: a disk that cannot be written, or a surprise."""
+    if isinstance(error, OSError) and error.errno in CANNOT_WRITE:
+        return str(write_error(Path(error.filename or folder.path), error))
+    return f"unexpected {type(error).__name__}: {error}. The trace is in {log}"
 
 
 def _trace(error: BaseException) -> None:

@@ -19,6 +19,11 @@ def compiled(function: Function) -> Function:
 
 
 def compiled_finite(function: Function) -> Function:
-    """Compile for finite arguments; sums may be regrouped so that they run in SIMD lanes."""
+    """Compile for finite arguments; sums may be regrouped so that they run in SIMD lanes.
+
+    Always inlined: a callee compiled on its own regroups otherwise than inside its caller, and
+    which of both runs would depend on whether the disk cache was warm. So would the last bits.
+    """
     flags = {"reassoc", "contract", "nsz", "nnan"}
-    return cast(Function, numba.njit(cache=True, error_model="numpy", fastmath=flags)(function))
+    compile_it = numba.njit(cache=True, error_model="numpy", fastmath=flags, forceinline=True)
+    return cast(Function, compile_it(function))
