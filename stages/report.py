@@ -129,9 +129,12 @@ def words_on_meshes(
     folder: RunFolder, config: RunConfig, catalogue: CatalogueFacts
 ) -> tuple[str, str, str]:
     """Where the meshes are from, their licence in a line, and what their folder says of it."""
-    if all(item.source == "parametric" for item in catalogue.objects):
+    embedded = sum(item.source == "parametric" for item in catalogue.objects)
+    if embedded == len(catalogue.objects):
         return "softgrip's embedded parametric objects", "Apache-2.0, with softgrip", ""
-    meshes = config.dataset.meshes or f"{len(catalogue.objects)} mesh files"
+    meshes = config.dataset.meshes or f"{len(catalogue.objects) - embedded} mesh files"
+    if embedded:
+        meshes += f", and {embedded} of softgrip's embedded objects"
     if config.dataset.licence:
         return meshes, config.dataset.licence, ""
     place = folder.state("mesh_dir")
