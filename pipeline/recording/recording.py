@@ -15,6 +15,9 @@ How many things a recording shows is bounded by ``[recording]`` of run.toml, so 
 under `LARGEST_MB` of ``cost``; what it costs is ``recording_share`` of the stage's summary.
 """
 
+import errno
+import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
@@ -28,6 +31,7 @@ from pipeline.artifacts.publishing import published
 from pipeline.recording.cost import recording_cost
 
 APPLICATION = "softgrip"
+NO_ROOM_BYTES = 1 << 20
 ROOTS = ("world", "camera", "curves", "notes")
 TIMELINES = {
     "objects": "object",
@@ -58,9 +62,20 @@ def recording(
             with nullcontext() if amid_work else recording_cost.running():
                 yield stream
         finally:
-            with recording_cost.running():
+            with recording_cost.running(), _disk_full_told(scratch):
                 stream.flush()
                 stream.disconnect()
+
+
+@contextmanager
+def _disk_full_told(path: Path) -> Iterator[None]:
+    """Rerun's writer stops at a full disk and says only that it stopped: say why."""
+    try:
+        yield
+    except RuntimeError as error:
+        if shutil.disk_usage(path.parent).free < NO_ROOM_BYTES:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path)) from error
+        raise
 
 
 def looking(
