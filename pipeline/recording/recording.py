@@ -56,6 +56,7 @@ def recording(
     """
     with published(path) as scratch:
         with recording_cost.running():
+            _check_room(scratch)
             stream = rr.RecordingStream(f"{APPLICATION}_{stage}", recording_id=recording_id)
             stream.save(scratch, default_blueprint=blueprint)
         try:
@@ -72,10 +73,15 @@ def _disk_full_told(path: Path) -> Iterator[None]:
     """Rerun's writer stops at a full disk and says only that it stopped: say why."""
     try:
         yield
-    except RuntimeError as error:
-        if shutil.disk_usage(path.parent).free < NO_ROOM_BYTES:
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path)) from error
+    except RuntimeError:
+        _check_room(path)
         raise
+
+
+def _check_room(path: Path) -> None:
+    """Raise OSError on a full disk: Rerun would wait there for its writer, and for ever."""
+    if shutil.disk_usage(path.parent).free < NO_ROOM_BYTES:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
 
 
 def looking(
