@@ -29,7 +29,7 @@ ifeq (,$(strip $(WORKERS)))
 unexport WORKERS
 endif
 
-.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery review report export lint fuzz regress clean FORCE
+.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios review report export lint fuzz regress clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -102,6 +102,9 @@ test: .venv/.ready lint reader  ## lint, types, tests
 bench: .venv/.ready  ## speed of labelling, QP, storage and control, to runs/bench/bench.json
 	@$(MAKE) --no-print-directory scenes RUN=bench
 	@$(PY) -m stages.bench
+
+scenarios: .venv/.ready  ## failure modes of Supplement VIII with RUN's network, to runs/<run>/scenarios.md
+	@$(PY) -m stages.scenarios
 
 gallery: .venv/.ready  ## the nine levels on one sheet, to runs/<run>/gallery.png
 	@$(PY) -m stages.gallery

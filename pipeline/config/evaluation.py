@@ -72,6 +72,18 @@ class PolicyConfig(Section):
     correction_radius_m: float = Field(
         0.015, ge=0, description="how far one correction may move the contact [m]"
     )
+    correction_tilt_rad: float = Field(
+        0.3, gt=0, le=math.pi, description="how far one correction may turn the approach [rad]"
+    )
+    commit_m: float = Field(
+        0.03, ge=0, description="this near to the contact nothing is corrected any more [m]"
+    )
+    retargets: int = Field(
+        3, ge=0, description="how often another candidate may be taken after a closer look"
+    )
+    retarget_gain: float = Field(
+        0.1, ge=0, le=1, description="what q-hat another must promise more for that [1]"
+    )
     correction_gain: float = Field(
         0.02, ge=0, le=1, description="rise of q-hat that a correction must promise [1]"
     )

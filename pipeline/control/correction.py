@@ -39,7 +39,9 @@ def corrected(
         rng,
     )
     free = free_of_collision(near.world_from_contact, cloud.points_m, config.hand)
-    near = near.take(free)
+    # Near the contact the gripper has no room left to swing round.
+    alike = near.world_from_contact[:, :3, 2] @ aim[:3, 2] >= np.cos(policy.correction_tilt_rad)
+    near = near.take(free & alike)
     if len(near) == 0:
         return None
     quality = ranking([picture], near)

@@ -27,6 +27,7 @@ from pipeline.control.wrench_monitor import Event, WrenchMonitor, trimmed
 _SEARCH_M = 0.06  # past the expected contact the pad goes on at most this far
 _RETREAT_M = 0.05
 _TUG_M = 0.01  # the first bit of the lift, in which a seal shows its pull
+_APART_M = 0.03  # another place to grasp, not the same once more
 _TRIM_FROM_M = 0.03  # clear of the neighbours
 
 
@@ -97,6 +98,9 @@ class Attempt:
         self._rng = rng
         self._avoid_m = avoid_m
         self._monitor = WrenchMonitor(config.policy)
+        self._ranked: list[tuple[float, Float[np.ndarray, "4 4"]]] = []
+        self._rejected_m: list[Float[np.ndarray, " 3"]] = []
+        self._retargets_left = config.policy.retargets if strategy.corrects else 0
         self.decision = Decision()
 
     def run(self) -> Decision:
@@ -142,10 +146,10 @@ class Attempt:
         free = free_of_collision(poses, cloud.points_m, self._config.hand)
         if not free.any():
             return Cause.NO_CANDIDATE
-        for index in np.argsort(-quality, kind="stable"):
-            if free[index] and self._can_reach(facing(poses[index], self._robot.pose())):
-                self._aim(poses[index], quality[index])
-                return None
+        order = np.argsort(-quality, kind="stable")
+        self._ranked = [(float(quality[i]), poses[i]) for i in order if free[i]]
+        if self._next_best(least=0.0):
+            return None
         return Cause.UNREACHABLE
 
     def _look_closer(
@@ -170,6 +174,31 @@ class Attempt:
             more.append(picture)
         return more
 
+    def _next_best(self, least: float) -> bool:
+        """Aim at the best of what is left that promises at least so much and can be reached."""
+        for quality, pose in self._ranked:
+            if quality < least:
+                break
+            distance = [np.linalg.norm(pose[:3, 3] - aim) for aim in self._rejected_m]
+            if min(distance, default=np.inf) < _APART_M:
+                continue
+            if self._can_reach(facing(pose, self._robot.pose())):
+                self._aim(pose, quality)
+                return True
+        return False
+
+    def _retargeted(self) -> bool:
+        """Whether, seen from near, the aim promises clearly less than another; then aim there."""
+        if self._retargets_left == 0:
+            return False
+        decision = self.decision
+        self._rejected_m.append(decision.world_from_contact[:3, 3])
+        if self._next_best(decision.predicted_quality + self._policy.retarget_gain):
+            self._retargets_left -= 1
+            return True
+        self._rejected_m.pop()
+        return False
+
     def _go_above(self) -> Cause | None:
         return self._travel(backed_off(self.decision.world_from_contact, self._policy.standoff_m))
 
@@ -180,6 +209,8 @@ class Attempt:
             here = self._robot.pose()
             if self._strategy.corrects and self._sees(aim, here):
                 cause = self._correct()
+                if cause is None and self._retargeted():
+                    cause = self._go_above()
                 if cause is not None:
                     return cause
                 aim = self.decision.world_from_contact
@@ -197,7 +228,9 @@ class Attempt:
                 return Cause.NO_CONTACT
 
     def _sees(self, aim: Float[np.ndarray, "4 4"], here: Float[np.ndarray, "4 4"]) -> bool:
-        """Whether the aim is not too near for the wrist's camera."""
+        """Whether the aim is not too near: for the wrist's camera, or to go elsewhere."""
+        if (here[:3, 3] - aim[:3, 3]) @ aim[:3, 2] < self._policy.commit_m:
+            return False
         camera = self._eyes.wrist_camera(here)
         distance = np.linalg.norm(aim[:3, 3] - camera.world_from_camera[:3, 3])
         return bool(distance >= camera.near_m + self._policy.correction_radius_m)

@@ -64,6 +64,8 @@ class SuctionGripper:
             {i: item.mesh for i, item in objects.items()}, config.scenes.table_side_m
         )
         self._joint: SuctionJoint | None = None
+        self.conveyor_m_s = 0.0
+        """Speed along world x of all that is not held: objects that move (Supplement VIII)."""
         self._steps = max(1, round(1 / config.evaluate.policy.rate_hz / world.timestep))
         self.begin()
 
@@ -217,6 +219,7 @@ class SuctionGripper:
             if not holds:
                 self._joint.open()
                 self._joint = None
+        self._convey()
         self._world.step()
         self.time_s += self._world.timestep
         push = self._push_on_rigid_parts()
@@ -226,6 +229,15 @@ class SuctionGripper:
         load[:3] += into_gripper @ push[:3]
         load[3:] += into_gripper @ push[3:]
         return load, float(np.linalg.norm(push[:3]))
+
+    def _convey(self) -> None:
+        if self.conveyor_m_s == 0.0:
+            return
+        held = self._joint.body if self._joint is not None else None
+        for body in self._bodies.values():
+            if body is not held:
+                falling = float(body.rigid.linear_velocity[2])
+                body.rigid.set_linear_velocity([self.conveyor_m_s, 0.0, falling])
 
     def _push_on_rigid_parts(self) -> Float[np.ndarray, " 6"] | None:
         """Contact force, and its moment about the pad's centre, in WCS; None without contact."""

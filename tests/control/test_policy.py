@@ -144,3 +144,19 @@ def test_a_place_that_failed_is_not_tried_again() -> None:
     second, _ = tried(plate(), FakeRobot(TOP_M), OPEN, avoid_m=[failed])
     distance = np.linalg.norm(second.world_from_contact[:3, 3] - failed)
     assert distance > CONFIG.policy.avoid_radius_m
+
+
+def test_a_place_that_looks_bad_from_near_is_left_for_another() -> None:
+    """Two small plates; the first promises more from afar and nothing from near."""
+    robot = FakeRobot(TOP_M)
+    small = plate() * [0.4, 0.4, 1.0]
+    points = np.concatenate([small, small + np.array([0.25, 0.0, 0.0])])
+
+    def deceived(pictures: Sequence[DepthPicture], candidates: Candidates) -> np.ndarray:
+        first = candidates.world_from_contact[:, 0, 3] < 0.1
+        from_near = len(pictures) == 1 and robot.state is State.APPROACH
+        return np.where(first, 0.05 if from_near else 0.9, 0.6)
+
+    decision, _ = tried(points, robot, replace(CLOSED, ranking=deceived))
+    assert decision.cause is Cause.LIFTED
+    assert decision.world_from_contact[0, 3] > 0.15

@@ -1,0 +1,118 @@
+"""Supplement VIII as scenes: transparent, flush neighbours, slim, moving; and a plain one beside.
+
+Each is one or two boxes on the table, turned and placed at random from trial to trial, so that a
+row of results says one thing.
+"""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import trimesh
+from jaxtyping import Float
+
+from pipeline.clutter.scene import ClutterScene, PlacedObject
+from pipeline.geometry.catalogue import CatalogueObject, Material
+from pipeline.geometry.mesh import Mesh
+from pipeline.geometry.shape import mass_properties, nsvr, shape_class, surface_area, volume
+
+_DENSITY_KG_M3 = 300.0
+_FACE_M = 0.006
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """What lies on the table, and how fast it passes.
+
+    sides_m : of each box. gap_m : between two boxes that stand side by side along their y.
+    speed_m_s : along world x, as on a conveyor.
+    """
+
+    name: str
+    sides_m: tuple[float, float, float]
+    count: int = 1
+    gap_m: float = 0.0
+    material: Material = "opaque"
+    speed_m_s: float = 0.0
+
+
+_PLAIN = (0.07, 0.07, 0.04)
+_SLIM = (0.14, 0.024, 0.03)
+SCENARIOS = (
+    Scenario("plain", _PLAIN),
+    Scenario("transparent", _PLAIN, material="transparent"),
+    Scenario("flush neighbours", (0.06, 0.06, 0.04), count=2, gap_m=0.0005),
+    Scenario("slim, alone", _SLIM),
+    Scenario("slim, side by side", _SLIM, count=2, gap_m=0.004),
+    Scenario("moving, 10 mm/s", _PLAIN, speed_m_s=0.010),
+    Scenario("moving, 25 mm/s", _PLAIN, speed_m_s=0.025),
+    Scenario("moving, 50 mm/s", _PLAIN, speed_m_s=0.050),
+    Scenario("moving, 100 mm/s", _PLAIN, speed_m_s=0.100),
+)
+
+
+def trials(
+    scenario: Scenario, count: int, rng: np.random.Generator
+) -> Iterator[tuple[ClutterScene, dict[str, CatalogueObject]]]:
+    """So many scenes of a kind."""
+    item = _box(scenario)
+    for number in range(count):
+        middle = np.array([*rng.uniform(-0.1, 0.1, 2), 0.0])
+        # What passes begins upstream.
+        middle[0] -= 0.2 if scenario.speed_m_s else 0.0
+        angle = rng.uniform(-math.pi, math.pi)
+        step = scenario.sides_m[1] + scenario.gap_m
+        placed = tuple(
+            PlacedObject(
+                item.name,
+                index + 1,
+                _standing(middle, angle, (index - (scenario.count - 1) / 2) * step, scenario),
+            )
+            for index in range(scenario.count)
+        )
+        gaps = np.full(scenario.count, scenario.gap_m if scenario.count > 1 else np.inf)
+        scene = ClutterScene(
+            f"{scenario.name} {number:02d}", 0, "test", number, placed, gaps, (), 0.0, ()
+        )
+        yield scene, {item.name: item}
+
+
+def _standing(
+    middle_m: Float[np.ndarray, " 3"], angle_rad: float, aside_m: float, scenario: Scenario
+) -> Float[np.ndarray, "4 4"]:
+    cosine, sine = math.cos(angle_rad), math.sin(angle_rad)
+    pose = np.eye(4)
+    pose[:2, :2] = [[cosine, -sine], [sine, cosine]]
+    pose[:3, 3] = middle_m + aside_m * pose[:3, 1]
+    pose[2, 3] = scenario.sides_m[2] / 2
+    return pose
+
+
+def _box(scenario: Scenario) -> CatalogueObject:
+    shape = trimesh.creation.box(scenario.sides_m).subdivide_to_size(_FACE_M)
+    mesh = Mesh(np.asarray(shape.vertices, np.float64), np.asarray(shape.faces, np.int64))
+    coarse = trimesh.creation.box(scenario.sides_m)
+    part = Mesh(np.asarray(coarse.vertices, np.float64), np.asarray(coarse.faces, np.int64))
+    mass = mass_properties(mesh, _DENSITY_KG_M3)
+    value = nsvr(mesh)
+    return CatalogueObject(
+        name=scenario.name,
+        source="scenario",
+        source_sha256="scenario",
+        unit="m",
+        unit_known_by="declared",
+        repairs=(),
+        scale=1.0,
+        target_extent_m=max(scenario.sides_m),
+        area_m2=surface_area(mesh),
+        volume_m3=volume(mesh),
+        nsvr=value,
+        shape_class=shape_class(value),
+        mass_kg=mass.mass_kg,
+        centre_of_mass_m=mass.centre_of_mass_m,
+        inertia_kg_m2=mass.inertia_kg_m2,
+        mesh=mesh,
+        convex_parts=(part,),
+        material=scenario.material,
+    )

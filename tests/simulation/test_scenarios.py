@@ -1,0 +1,62 @@
+"""Supplement VIII as scenes: what is said of them holds, and each attempt ends with a cause."""
+
+import numpy as np
+import pytest
+
+from pipeline.config import RunConfig
+from pipeline.control.policy import Cause
+from pipeline.control.ranking import Predict
+from pipeline.simulation.picking import Clutter, strategy_of
+from pipeline.simulation.scenarios import SCENARIOS, trials
+
+BY_NAME = {scenario.name: scenario for scenario in SCENARIOS}
+CONFIG = RunConfig()
+
+
+def flatness(cloud: np.ndarray, seen: np.ndarray) -> np.ndarray:
+    """Stands for a network: how level the middle of the sub cloud is, and whether it is seen."""
+    middle = slice(5, -5)
+    heights = np.where(seen, cloud[..., 2], np.nan)[:, middle, middle].reshape(len(cloud), -1)
+    known = np.isfinite(heights).mean(axis=1)
+    spread = np.nanstd(np.where(known[:, None] > 0, heights, 0.0), axis=1)
+    return np.asarray(known * np.exp(-5 * spread))
+
+
+def tried(name: str, predict: Predict = flatness, seed: int = 0) -> tuple[Cause, Clutter]:
+    rng = np.random.default_rng(seed)
+    scenario = BY_NAME[name]
+    scene, objects = next(trials(scenario, 1, rng))
+    clutter = Clutter(scene, objects, CONFIG, rng)
+    clutter.gripper.conveyor_m_s = scenario.speed_m_s
+    return clutter.attempted(strategy_of("closed-loop", predict, CONFIG), []).cause, clutter
+
+
+def test_a_plain_box_is_lifted() -> None:
+    cause, clutter = tried("plain")
+    assert cause is Cause.LIFTED
+    assert clutter.bodies == {}
+
+
+def test_a_slow_box_is_caught_in_motion() -> None:
+    assert tried("moving, 10 mm/s")[0] is Cause.LIFTED
+
+
+@pytest.mark.parametrize("name", ["flush neighbours", "slim, side by side"])
+def test_neighbours_stand_at_their_gap_and_level(name: str) -> None:
+    scenario = BY_NAME[name]
+    scene, _ = next(trials(scenario, 1, np.random.default_rng(1)))
+    first, second = (placed.world_from_object[:3, 3] for placed in scene.objects)
+    gap = np.linalg.norm(first - second) - scenario.sides_m[1]
+    assert gap == pytest.approx(scenario.gap_m)
+    assert first[2] == second[2]
+
+
+def test_a_box_that_falls_off_is_taken_out_and_named() -> None:
+    """Carried over the table's edge while the pad goes for it: the attempt ends, not the run."""
+    rng = np.random.default_rng(0)
+    scene, objects = next(trials(BY_NAME["plain"], 1, rng))
+    clutter = Clutter(scene, objects, CONFIG, rng)
+    clutter.gripper.conveyor_m_s = 0.8
+    cause = clutter.attempted(strategy_of("closed-loop", flatness, CONFIG), []).cause
+    assert cause is not Cause.LIFTED
+    assert clutter.bodies == {}
