@@ -7,6 +7,7 @@ are another folder; folders of shards that are no more are removed.
 """
 
 import hashlib
+import os
 import shutil
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -14,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from filelock import FileLock
 
-from pipeline.artifacts.publishing import file_sha256
+from pipeline.artifacts.publishing import file_sha256, write_error
 from pipeline.artifacts.reading import open_artifact
 from pipeline.artifacts.sample_messages import STORED_AS, Samples, samples_of
 from pipeline.artifacts.sharding import listed_shards, read_index
@@ -78,12 +79,27 @@ def decode_shards(shards: dict[Path, ShardEntry], into: Path) -> None:
                 arrays[name] = np.lib.format.open_memmap(
                     into / f"{name}.npy", "w+", dtype=dtype, shape=(count, *found.shape[1:])
                 )
+                _reserve(into / f"{name}.npy")
             arrays[name][filled : filled + len(part)] = found
         filled += len(part)
     if not filled:
         raise ArtifactError("a split holds no samples", "Ask for more grasps or objects.")
     for array in arrays.values():
         array.flush()
+
+
+def _reserve(path: Path) -> None:
+    """Take the disk's room for a file now: a map that meets a full disk ends the process.
+
+    Raises
+    ------
+    ArtifactError : there is not enough.
+    """
+    try:
+        with path.open("rb+") as file:
+            os.posix_fallocate(file.fileno(), 0, path.stat().st_size)
+    except OSError as error:
+        raise write_error(path, error) from error
 
 
 def mapped_samples(folder: Path) -> Samples:
