@@ -44,7 +44,7 @@ def step_ms(
     on_wrist = camera_at("wrist", config.cameras.wrist, np.zeros(3), 1.0, 0.0, 0.0)
     seen: list[float] = []
     decided: list[float] = []
-    for _ in range(steps):
+    while len(decided) < steps:
         aim = np.eye(4)
         aim[:3, 3] = aims[rng.integers(len(aims))]
         height_m = rng.uniform(0.11, config.evaluate.policy.standoff_m)
@@ -54,7 +54,11 @@ def step_ms(
         window = window_around(camera, aim[:3, 3], LOOK_M)
         picture = DepthPicture(measured_depth(window, surfaces, None, rng), window)
         times.append(time.perf_counter())
-        corrected(picture, aim, ranking, config.evaluate, config.grasps.normal_radius_m, rng)
+        found = corrected(
+            picture, aim, ranking, config.evaluate, config.grasps.normal_radius_m, rng
+        )
+        if found is None:
+            continue  # too steep a place: no network was asked
         times.append(time.perf_counter())
         decided.append(times[2] - times[1])
         seen.append(times[2] - times[0])
