@@ -49,7 +49,11 @@ def cached_split(index: Path, split: str, cache: Path) -> Samples:
             scratch = cache / f".{split}.part"
             shutil.rmtree(scratch, ignore_errors=True)
             scratch.mkdir()
-            decode_shards(shards, scratch)
+            try:
+                decode_shards(shards, scratch)
+            except BaseException:  # an interrupt leaves nothing half either
+                shutil.rmtree(scratch)
+                raise
             for older in cache.glob(f"{split}-*"):
                 shutil.rmtree(older)
             scratch.rename(folder)

@@ -17,6 +17,10 @@ PAGES = (
 REDUCED = {
     "make test": ("make -n test", "these tests are part of it"),
     "make bench": ("make -n bench", "minutes of measuring; its parts have tests of their own"),
+    "make regress": (
+        "make -n regress",
+        "the reference is of run ci and a tiny one stands in its place; tests/regression runs it",
+    ),
     "make review RUN=ci STAGE=grasps": (
         "make -n review RUN=ci STAGE=grasps",
         "it ends when its viewer is closed; tests/stages/test_review.py opens it",

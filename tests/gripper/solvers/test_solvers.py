@@ -140,7 +140,9 @@ def test_real_problems_have_one_answer() -> None:
     """The textbook form by PIQP, a sparse lift by PIQP, another lift by Clarabel: the same
     verdict and q to 1e-6 on 2 000 problems and more, weak, degenerate, infeasible ones included.
 
-    PIQP's dense form may leave a few nearly degenerate ones at its cap, without a verdict.
+    PIQP's dense form may leave a few nearly degenerate ones at its cap, without a verdict, and at
+    a nearly perfect seal, where q has a norm's corner, an objective within its tolerance gives q
+    to 1e-5 only.
     """
     problems = from_heights(heights_on_meshes(mesh_folder(), 45))
     found = list(run_in_order(answers, problems, len(os.sched_getaffinity(0))))
@@ -153,7 +155,8 @@ def test_real_problems_have_one_answer() -> None:
                 assert theirs[2] == pytest.approx(ours[2], abs=1e-4)
                 continue
             assert theirs[0] is ours[0], name
-            assert theirs[2] == pytest.approx(ours[2], abs=1e-6), name
+            at_corner = name == "piqp-dense" and ours[2] > 0.999
+            assert theirs[2] == pytest.approx(ours[2], abs=1e-5 if at_corner else 1e-6), name
             agreed[name] += 1
     assert agreed["piqp-sparse"] == agreed["clarabel"] == len(problems)
     assert agreed["piqp-dense"] >= max(2000, len(problems) - 10)
