@@ -56,12 +56,14 @@ def run_in_order(
     waiting: deque[Future[Result]] = deque()
     try:
         for item in items:
-            waiting.append(pool.submit(job, item))
+            waiting.append(_submitted(pool, job, item))
             if len(waiting) >= workers * ahead_per_worker:
                 yield waiting.popleft().result()
         while waiting:
             yield waiting.popleft().result()
     except BrokenProcessPool as error:
+        for process in multiprocessing.active_children():  # one just started would wait for ever
+            process.kill()
         raise SoftgripError(
             "A worker process died: it was killed or the machine ran out of memory",
             "Run the same command again, it goes on where it stopped; "
@@ -69,6 +71,19 @@ def run_in_order(
         ) from error
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
+
+
+def _submitted(
+    pool: ProcessPoolExecutor, job: Callable[[Item], Result], item: Item
+) -> Future[Result]:
+    """``pool.submit``, which may have to start a process just as the pool breaks.
+
+    The pool closes its pipes when a worker dies; starting another then fails on the closed ones.
+    """
+    try:
+        return pool.submit(job, item)
+    except (ValueError, OSError) as error:
+        raise BrokenProcessPool(f"no further worker could be started: {error}") from error
 
 
 def _leave_interrupts_to_the_driver() -> None:

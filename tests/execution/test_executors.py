@@ -1,7 +1,10 @@
 """Results come in the order of the items, whoever computes them."""
 
+import multiprocessing
 import os
 import signal
+import time
+from collections.abc import Iterator
 
 import pytest
 
@@ -30,6 +33,20 @@ def test_order_is_that_of_the_items(workers: int) -> None:
 def test_a_killed_worker_is_a_sentence_not_a_hang() -> None:
     with pytest.raises(SoftgripError, match=r"worker process died.*WORKERS=1"):
         list(run_in_order(kill_yourself, range(4), 2))
+
+
+@pytest.mark.parametrize("pause_s", [0.0, 0.001, 0.003, 0.01, 0.03, 0.1])
+def test_a_worker_killed_while_the_next_one_starts(pause_s: float) -> None:
+    def items() -> Iterator[int]:
+        yield 1
+        for process in multiprocessing.active_children():
+            process.kill()
+        time.sleep(pause_s)
+        yield from range(8)
+
+    with pytest.raises(SoftgripError, match=r"worker process died.*WORKERS=1"):
+        list(run_in_order(square, items(), 2))
+    assert not multiprocessing.active_children()
 
 
 @pytest.mark.parametrize("workers", [1, 2])
