@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from filelock import FileLock
 
 from pipeline.execution import RunFolder
 from stages.graph import STAGES
@@ -66,5 +67,12 @@ def make_run(runs: Path, workers: int) -> RunFolder:
 
 
 @pytest.fixture(scope="session")
-def run(tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
-    return make_run(tmp_path_factory.mktemp("one") / "runs", workers=1)
+def run(tmp_path_factory: pytest.TempPathFactory, worker_id: str) -> RunFolder:
+    """Made once, though several processes test side by side."""
+    base = tmp_path_factory.getbasetemp()
+    shared = base if worker_id == "master" else base.parent
+    with FileLock(shared / "run.lock"):
+        folder = RunFolder(shared / "one" / "runs" / "tiny")
+        if not folder.path.exists():
+            make_run(folder.path.parent, workers=1)
+    return folder

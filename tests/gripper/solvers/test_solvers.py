@@ -12,6 +12,7 @@ from jaxtyping import Float
 from scipy.optimize import linprog
 
 from pipeline.config import GripperConfig
+from pipeline.config.grasps import SolverName
 from pipeline.execution import run_in_order
 from pipeline.gripper import GraspStatus, QpSolution, QualityProblem, build_pad
 from pipeline.gripper.contact import contact_of
@@ -123,44 +124,53 @@ def assert_one_answer(problem: QualityProblem, ours: QpSolution, peer: Solver) -
 
 
 Answer = tuple[GraspStatus, int, float]
-PEERS = ("piqp-dense", "piqp-sparse", "clarabel")
+PEERS: tuple[SolverName, ...] = ("piqp-sparse", "clarabel")
+DENSE: SolverName = "piqp-dense"
+DENSE_EVERY = 5  # the dense form takes fifty times the sparse one's time
 
 
-def answers(problem: QualityProblem) -> tuple[Answer, list[Answer]]:
-    """Status, iterations and q of the production solver, and of every peer."""
+def answers(numbered: tuple[int, QualityProblem]) -> dict[SolverName, Answer]:
+    """Status, iterations and q of the production solver, and of its peers."""
+    number, problem = numbered
     ours = SOLVERS["structured"](problem)
     if ours.status is GraspStatus.SOLVED:
         assert_meets_limits(problem, ours)
-    peers = [SOLVERS[name](problem) for name in PEERS]  # type: ignore[index]
-    found = [(s.status, s.iterations, quality_of(problem, s)) for s in (ours, *peers)]
-    return found[0], found[1:]
+    peers = (*PEERS, DENSE) if number % DENSE_EVERY == 0 else PEERS
+    found = {"structured": ours} | {name: SOLVERS[name](problem) for name in peers}
+    return {
+        name: (solution.status, solution.iterations, quality_of(problem, solution))
+        for name, solution in found.items()
+    }
 
 
 def test_real_problems_have_one_answer() -> None:
-    """The textbook form by PIQP, a sparse lift by PIQP, another lift by Clarabel: the same
-    verdict and q to 1e-6 on 2 000 problems and more, weak, degenerate, infeasible ones included.
+    """A sparse lift by PIQP, another lift by Clarabel, on every fifth the textbook form by PIQP:
+    the same verdict and q to 1e-6 on 2 000 problems and more, weak, degenerate, infeasible ones
+    included.
 
     PIQP's dense form may leave a few nearly degenerate ones at its cap, without a verdict, and at
     a nearly perfect seal, where q has a norm's corner, an objective within its tolerance gives q
     to 1e-5 only.
     """
     problems = from_heights(heights_on_meshes(mesh_folder(), 45))
-    found = list(run_in_order(answers, problems, len(os.sched_getaffinity(0))))
-    agreed = dict.fromkeys(PEERS, 0)
-    for ours, peers in found:
-        assert ours[0] in (GraspStatus.SOLVED, GraspStatus.INFEASIBLE)
-        assert ours[1] <= 100
-        for name, theirs in zip(PEERS, peers, strict=True):
-            if name == "piqp-dense" and theirs[0] is GraspStatus.MAX_ITERATIONS:
-                assert theirs[2] == pytest.approx(ours[2], abs=1e-4)
+    numbered = list(enumerate(problems))
+    agreed = dict.fromkeys((*PEERS, DENSE), 0)
+    verdicts = []
+    for answer in run_in_order(answers, numbered, len(os.sched_getaffinity(0))):
+        status, iterations, q = answer.pop("structured")
+        verdicts.append(status)
+        assert status in (GraspStatus.SOLVED, GraspStatus.INFEASIBLE)
+        assert iterations <= 100
+        for name, theirs in answer.items():
+            if name == DENSE and theirs[0] is GraspStatus.MAX_ITERATIONS:
+                assert theirs[2] == pytest.approx(q, abs=1e-4)
                 continue
-            assert theirs[0] is ours[0], name
-            at_corner = name == "piqp-dense" and ours[2] > 0.999
-            assert theirs[2] == pytest.approx(ours[2], abs=1e-5 if at_corner else 1e-6), name
+            assert theirs[0] is status, name
+            at_corner = name == DENSE and q > 0.999
+            assert theirs[2] == pytest.approx(q, abs=1e-5 if at_corner else 1e-6), name
             agreed[name] += 1
-    assert agreed["piqp-sparse"] == agreed["clarabel"] == len(problems)
-    assert agreed["piqp-dense"] >= max(2000, len(problems) - 10)
-    verdicts = [ours[0] for ours, _ in found]
+    assert agreed["piqp-sparse"] == agreed["clarabel"] == len(problems) >= 2000
+    assert agreed[DENSE] >= len(problems) // DENSE_EVERY - 5
     assert min(verdicts.count(GraspStatus.SOLVED), verdicts.count(GraspStatus.INFEASIBLE)) > 200
 
 
