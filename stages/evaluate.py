@@ -29,7 +29,7 @@ from pipeline.execution import (
 )
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.network.export import OnnxPredictor
-from pipeline.recording.evaluate import blueprint, show_attempts
+from pipeline.recording.evaluate import blueprint, show_attempts, worst_first
 from pipeline.recording.recording import recording, spread
 from pipeline.recording.results import markdown
 from pipeline.simulation.picking import run_clutter
@@ -136,7 +136,8 @@ def publish(
     """The film and the table, then the artifact."""
     meshes = {n: item.mesh for n, (item, _) in catalogue(stage.upstream("objects")).items()}
     names = {s.scene_id: [placed.object_name for placed in s.objects] for s in scenes}
-    shown = [attempts[i] for i in spread(len(attempts), stage.config.recording.attempts)]
+    ordered = worst_first(attempts)
+    shown = [ordered[i] for i in spread(len(ordered), stage.config.recording.attempts)]
     text = markdown(results.levels, results.policies, results.comparisons)
     with recording(stage.recording, stage.stage.name, stage.key.digest, blueprint()) as stream:
         show_attempts(stream, shown, names, meshes, text)

@@ -65,7 +65,7 @@ def show_attempts(
     meshes: Mapping[str, Mesh],
     table: str,
 ) -> None:
-    """Film the attempts one after the other; ``names`` are each scene's objects by body id."""
+    """Film the attempts in their order; ``names`` are each scene's objects by body id."""
     stream.log(
         "notes/result", rr.TextDocument(table, media_type=rr.MediaType.MARKDOWN), static=True
     )
@@ -76,7 +76,7 @@ def show_attempts(
     name_curve(stream, "curves/state", ", ".join(STATES), colours.PALETTE[4])
     _show_gripper(stream)
     frame = 0
-    for number, made in enumerate(worst_first(attempts)):
+    for number, made in enumerate(attempts):
         step(stream, TIMELINE, frame)
         objects = numbered(stream, "world/objects", number)
         for index, name in enumerate(names[made.scene_id]):
