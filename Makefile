@@ -97,7 +97,7 @@ doctor:  ## what is present, what is missing, how to mend it
 	@$$(test -x $(PY) && echo $(PY) || echo $(PYTHON3)) -m pipeline.machine.doctor
 
 test: .venv/.ready lint reader  ## lint, types, tests
-	$(PY) -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
+	OMP_WAIT_POLICY=PASSIVE $(PY) -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 
 bench: .venv/.ready  ## speed of labelling, QP, storage and control, to runs/bench/bench.json
 	@$(MAKE) --no-print-directory scenes RUN=bench
