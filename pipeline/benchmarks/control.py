@@ -8,7 +8,8 @@ from pipeline.benchmarks.clock import quantiles_ms
 from pipeline.clutter.scene import ClutterScene
 from pipeline.config import RunConfig
 from pipeline.control.cloud import DepthPicture, merged_cloud
-from pipeline.control.correction import LOOK_M, corrected
+from pipeline.control.correction import LOOK_M
+from pipeline.control.local_phase import LocalPhase
 from pipeline.control.ranking import NetworkRanking
 from pipeline.control.viewpoints import gripper_above
 from pipeline.geometry.mesh import Mesh
@@ -19,6 +20,7 @@ from pipeline.sensing.depth_by_rays import measured_depth, window_around
 from pipeline.simulation.eyes import gripper_from_camera, moved
 
 SCORE_BATCH = 64
+STEP_M = 0.017  # what the gripper comes down in a control step
 
 
 def step_ms(
@@ -47,19 +49,20 @@ def step_ms(
     while len(decided) < steps:
         aim = np.eye(4)
         aim[:3, 3] = aims[rng.integers(len(aims))]
-        height_m = rng.uniform(0.11, config.evaluate.policy.standoff_m)
-        pose = gripper_above(aim[:3, 3], height_m, np.eye(4))
-        camera = moved(on_wrist, pose @ gripper_from_camera(config.evaluate.hand))
-        times: list[float] = [time.perf_counter()]
-        window = window_around(camera, aim[:3, 3], LOOK_M)
-        picture = DepthPicture(measured_depth(window, surfaces, None, rng), window)
-        times.append(time.perf_counter())
-        found = corrected(
-            picture, aim, ranking, config.evaluate, config.grasps.normal_radius_m, rng
-        )
-        if found is None:
-            continue  # too steep a place: no network was asked
-        times.append(time.perf_counter())
-        decided.append(times[2] - times[1])
-        seen.append(times[2] - times[0])
+        local = LocalPhase(ranking, config.evaluate, config.grasps.normal_radius_m, rng)
+        # All the way down, as far as the camera sees.
+        for height_m in np.arange(config.evaluate.policy.standoff_m, 0.11, -STEP_M):
+            pose = gripper_above(aim[:3, 3], height_m, np.eye(4))
+            camera = moved(on_wrist, pose @ gripper_from_camera(config.evaluate.hand))
+            times: list[float] = [time.perf_counter()]
+            window = window_around(camera, aim[:3, 3], LOOK_M)
+            picture = DepthPicture(measured_depth(window, surfaces, None, rng), window)
+            times.append(time.perf_counter())
+            found = local.look(picture, aim)
+            local.passed_on(aim)
+            if found is None:
+                break  # too steep a place: no network was asked
+            times.append(time.perf_counter())
+            decided.append(times[2] - times[1])
+            seen.append(times[2] - times[0])
     return {"decision": quantiles_ms(decided), "with the picture": quantiles_ms(seen)}

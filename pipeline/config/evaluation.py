@@ -87,6 +87,12 @@ class PolicyConfig(Section):
     correction_gain: float = Field(
         0.02, ge=0, le=1, description="rise of q-hat that a correction must promise [1]"
     )
+    pictures_kept: int = Field(
+        2, ge=0, le=8, description="pictures of the wrist that a correction looks at beside its own"
+    )
+    gone_share: float = Field(
+        0.05, ge=0, le=1, description="share of them looked through that tells a moved object [1]"
+    )
     smoothing_m: float = Field(
         0.007, ge=0, description="q-hat is averaged over neighbours this near [m]"
     )

@@ -1,5 +1,7 @@
 """The local phase's one step: look at the aim again, and move it where that promises more."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Float
 
@@ -15,20 +17,20 @@ _VOXEL_M = 0.002
 
 
 def corrected(
-    picture: DepthPicture,
+    pictures: Sequence[DepthPicture],
     aim: Float[np.ndarray, "4 4"],
     ranking: Ranking,
     config: EvaluateConfig,
     normal_radius_m: float,
     rng: np.random.Generator,
 ) -> tuple[Float[np.ndarray, "4 4"], float] | None:
-    """The pose to aim at now and its q-hat; None where the picture shows nothing to go by.
+    """The pose to aim at now and its q-hat; None where the pictures show nothing to go by.
 
     The aim itself, as it is seen now, is the first candidate: another must promise more by
     ``correction_gain``, so that noise does not move the gripper to and fro.
     """
     policy = config.policy
-    cloud = merged_cloud([picture], _VOXEL_M)
+    cloud = merged_cloud(pictures, _VOXEL_M)
     near = sample_near(
         cloud,
         aim[:3, 3],
@@ -44,7 +46,7 @@ def corrected(
     near = near.take(free & alike)
     if len(near) == 0:
         return None
-    quality = ranking([picture], near)
+    quality = ranking(pictures, near)
     best = int(np.argmax(quality))
     if quality[best] < quality[0] + policy.correction_gain:
         best = 0

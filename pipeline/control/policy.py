@@ -18,7 +18,8 @@ from pipeline.config.evaluation import EvaluateConfig, PolicyName
 from pipeline.control.candidates import Candidates, sample_candidates
 from pipeline.control.clearance import free_of_collision
 from pipeline.control.cloud import Cloud, DepthPicture, merged_cloud
-from pipeline.control.correction import LOOK_M, corrected
+from pipeline.control.correction import LOOK_M
+from pipeline.control.local_phase import LocalPhase
 from pipeline.control.ranking import Ranking
 from pipeline.control.robot import Eyes, Reading, Robot, State
 from pipeline.control.viewpoints import best_apart, facing, gripper_above
@@ -100,6 +101,7 @@ class Attempt:
         self._monitor = WrenchMonitor(config.policy)
         self._ranked: list[tuple[float, Float[np.ndarray, "4 4"]]] = []
         self._rejected_m: list[Float[np.ndarray, " 3"]] = []
+        self._local = LocalPhase(strategy.ranking, config, normal_radius_m, rng)
         self._retargets_left = config.policy.retargets if strategy.corrects else 0
         self.decision = Decision()
 
@@ -172,6 +174,7 @@ class Attempt:
             if picture is None:
                 return Cause.CAMERA_STOPPED
             more.append(picture)
+            self._local.remember(picture)
         return more
 
     def _next_best(self, least: float) -> bool:
@@ -210,11 +213,14 @@ class Attempt:
             if self._strategy.corrects and self._sees(aim, here):
                 cause = self._correct()
                 if cause is None and self._retargeted():
+                    self._local.start_over()
                     cause = self._go_above()
                 if cause is not None:
                     return cause
                 aim = self.decision.world_from_contact
-            reading = self._robot.step(backed_off(aim, -_SEARCH_M), self._policy.speed_m_s)
+            ahead = backed_off(self._local.met(aim, here), -_SEARCH_M)
+            reading = self._robot.step(ahead, self._policy.speed_m_s)
+            self.decision.world_from_contact = self._local.passed_on(aim)
             event = self._monitor.moving(reading)
             if event is Event.COLLISION:
                 self._travel(backed_off(self._robot.pose(), _RETREAT_M))
@@ -241,14 +247,7 @@ class Attempt:
         picture = self._eyes.wrist(aim[:3, 3], LOOK_M)
         if picture is None:
             return Cause.CAMERA_STOPPED
-        found = corrected(
-            picture,
-            aim,
-            self._strategy.ranking,
-            self._config,
-            self._normal_radius_m,
-            self._rng,
-        )
+        found = self._local.look(picture, aim)
         if found is not None:
             self._aim(*found)
             self.decision.corrections += 1

@@ -10,7 +10,7 @@ from pipeline.config import EvaluateConfig
 from pipeline.control.candidates import Candidates
 from pipeline.control.cloud import DepthPicture
 from pipeline.control.policy import Attempt, Cause, Decision, Strategy
-from pipeline.control.robot import State
+from pipeline.control.robot import Reading, State
 from tests.control.fakes import FakeEyes, FakeRobot
 
 CONFIG = EvaluateConfig()
@@ -132,6 +132,33 @@ def test_a_correction_follows_an_object_that_moved() -> None:
     assert place.max() <= 0.041
 
 
+@pytest.mark.parametrize("passes_m_s", [0.0, 0.1])
+def test_it_meets_an_object_that_passes(passes_m_s: float) -> None:
+    """Also where the camera is too near to see it any more."""
+    robot = FakeRobot(TOP_M)
+    eyes = FakeEyes(plate()[::3] * [0.8, 0.8, 1.0], robot)
+    begun = eyes.points[:, 0].mean()
+    step = robot.step
+
+    def passing(world_from_gripper: np.ndarray, speed_m_s: float) -> Reading:
+        if not robot.sucks:
+            eyes.points = eyes.points + np.array([passes_m_s / CONFIG.policy.rate_hz, 0.0, 0.0])
+        return step(world_from_gripper, speed_m_s)
+
+    def near_the_middle(_: Sequence[DepthPicture], candidates: Candidates) -> np.ndarray:
+        aside = candidates.world_from_contact[:, :2, 3] - eyes.points[:, :2].mean(axis=0)
+        return np.asarray(np.exp(-np.linalg.norm(aside, axis=1) / 0.03))
+
+    robot.step = passing  # type: ignore[method-assign]
+    strategy = replace(CLOSED, ranking=near_the_middle)
+    rng = np.random.default_rng(0)
+    decision = Attempt(eyes, robot, strategy, CONFIG, RADIUS_M, rng).run()
+    assert decision.cause is Cause.LIFTED
+    middle = eyes.points[:, :2].mean(axis=0)
+    assert middle[0] - begun >= 3 * passes_m_s * 0.2
+    assert np.linalg.norm(decision.world_from_contact[:2, 3] - middle) < 0.012
+
+
 def test_without_corrections_the_first_pose_stands() -> None:
     decision, eyes = tried(plate(), FakeRobot(TOP_M), OPEN)
     assert eyes.wrist_looks == decision.corrections == 0
@@ -152,9 +179,9 @@ def test_a_place_that_looks_bad_from_near_is_left_for_another() -> None:
     small = plate() * [0.4, 0.4, 1.0]
     points = np.concatenate([small, small + np.array([0.25, 0.0, 0.0])])
 
-    def deceived(pictures: Sequence[DepthPicture], candidates: Candidates) -> np.ndarray:
+    def deceived(_: Sequence[DepthPicture], candidates: Candidates) -> np.ndarray:
         first = candidates.world_from_contact[:, 0, 3] < 0.1
-        from_near = len(pictures) == 1 and robot.state is State.APPROACH
+        from_near = robot.state is State.APPROACH
         return np.where(first, 0.05 if from_near else 0.9, 0.6)
 
     decision, _ = tried(points, robot, replace(CLOSED, ranking=deceived))

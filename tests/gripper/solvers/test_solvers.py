@@ -136,7 +136,8 @@ def answers(numbered: tuple[int, QualityProblem]) -> dict[SolverName, Answer]:
     if ours.status is GraspStatus.SOLVED:
         assert_meets_limits(problem, ours)
     peers = (*PEERS, DENSE) if number % DENSE_EVERY == 0 else PEERS
-    found = {"structured": ours} | {name: SOLVERS[name](problem) for name in peers}
+    found: dict[SolverName, QpSolution] = {"structured": ours}
+    found |= {name: SOLVERS[name](problem) for name in peers}
     return {
         name: (solution.status, solution.iterations, quality_of(problem, solution))
         for name, solution in found.items()
