@@ -14,7 +14,7 @@ import trimesh
 from pipeline.config.objects import ObjectsConfig
 from pipeline.errors import MeshError
 from pipeline.geometry.mesh import Mesh
-from pipeline.geometry.mesh_headers import check_header, check_off_faces
+from pipeline.geometry.mesh_headers import check_face_count, check_faces_allowed, check_header
 
 MESH_SUFFIXES = (".glb", ".obj", ".off", ".ply", ".stl")
 SOURCE_SUFFIXES = (*MESH_SUFFIXES, ".urdf")  # a URDF places meshes of the folder at a scale
@@ -129,30 +129,35 @@ def read_raw_mesh(
         )
     data = path.read_bytes()
     check_header(label, data, config.max_faces)
-    raw, declared = parse_mesh(label, data)
-    if path.suffix.lower() == ".off":
-        check_off_faces(label, data, len(raw.faces))
+    raw, declared = parse_mesh(label, data, config.max_faces)
+    check_face_count(label, data, len(raw.faces))
     check_arrays(label, raw, config.max_faces)
     return raw, declared, data
 
 
-def parse_mesh(label: str, data: bytes) -> tuple[Mesh, str | None]:
+def parse_mesh(label: str, data: bytes, max_faces: int) -> tuple[Mesh, str | None]:
     """The mesh in the file's own unit, and the unit it declares, if any.
 
-    Nothing else is opened: material files and textures that the mesh refers to stay unread.
+    Nothing else is opened: material files and textures that the mesh refers to, or holds, stay
+    unread.
     """
     suffix = Path(label).suffix.lower()
-    options = {"skip_materials": True} if suffix == ".obj" else {}
+    options = {"skip_materials": True} if suffix in (".obj", ".ply", ".glb") else {}
     try:
         scene = trimesh.load_scene(
             io.BytesIO(data), file_type=suffix[1:], process=False, allow_remote=False, **options
         )
+        # A part may be placed any number of times, and each time is a copy.
+        placed = [scene.geometry[scene.graph[node][1]] for node in scene.graph.nodes_geometry]
+        faces_placed = sum(len(getattr(part, "faces", ())) for part in placed)
+        check_faces_allowed(label, faces_placed, max_faces)
         merged = scene.to_mesh()
         vertices = np.array(merged.vertices, dtype=np.float64).reshape(-1, 3)
         faces = np.array(merged.faces, dtype=np.int64).reshape(-1, 3)
     except _PARSER_ERRORS as error:
+        reason = f"{type(error).__name__}: {error}".rstrip(": ")
         raise MeshError(
-            f"{label} cannot be read as {suffix[1:].upper()} ({type(error).__name__}: {error})",
+            f"{label} cannot be read as {suffix[1:].upper()} ({reason})",
             "Export the mesh again, or fetch the file again",
         ) from error
     units = "m" if suffix == ".glb" else _UNIT_NAMES.get(str(scene.units).lower())

@@ -24,6 +24,7 @@ from pipeline.geometry.mesh_files import (
     load_mesh_file,
     read_raw_mesh,
 )
+from pipeline.geometry.mesh_headers import check_faces_allowed
 
 URDF_SUFFIX = ".urdf"
 _PACKAGE = "package://"
@@ -66,6 +67,7 @@ def load_urdf_file(path: Path, folder: Path, name: str, config: ObjectsConfig) -
     root = _root(path, folder)
     digest = hashlib.sha256(path.read_bytes())
     parts: list[Mesh] = []
+    faces = 0
     for link, root_from_link in _placed_links(label, root):
         bodies = link.findall("visual") or link.findall("collision")
         for body in bodies:
@@ -74,6 +76,8 @@ def load_urdf_file(path: Path, folder: Path, name: str, config: ObjectsConfig) -
                 raise MeshError(f"{label} has a link without geometry", "Export it again")
             mesh, data = _shape(label, geometry[0], path, folder, config)
             digest.update(data)
+            faces += len(mesh.faces)
+            check_faces_allowed(label, faces, config.max_faces)
             parts.append(mesh.transformed(root_from_link @ _origin(label, body)))
     if not parts:
         raise MeshError(f"{label} has no visual or collision geometry", "Export it again")
@@ -118,18 +122,18 @@ def _placed_links(
                 "Fix the joint at the wanted pose, or export its links one by one",
             )
         above[child.get("link", "")] = (parent.get("link", ""), _origin(label, joint))
-    placed = []
-    for name, link in links.items():
-        pose, at = np.eye(4), name
-        for _ in range(len(links)):
-            if at not in above:
-                break
-            at, parent_from_child = above[at]
-            pose = parent_from_child @ pose
-        if at in above or at not in links:
+    placed: dict[str, Float[np.ndarray, "4 4"]] = {}
+    for name in links:
+        chain, at = [], name  # up to a link whose pose is known, each link once
+        while at not in placed and at in above and len(chain) < len(links):
+            chain.append(at)
+            at = above[at][0]
+        if at not in placed and (at in above or at not in links):
             raise MeshError(f"{label}: link '{name}' hangs on no root", "Mend its joints")
-        placed.append((link, pose))
-    return placed
+        pose = placed.setdefault(at, np.eye(4))
+        for child in reversed(chain):
+            pose = placed[child] = pose @ above[child][1]
+    return [(link, placed[name]) for name, link in links.items()]
 
 
 def _shape(

@@ -46,21 +46,7 @@ def sight_of(recording: Path, step: int | None = None) -> Sight:
     MachineError : the viewer does not start, as without any graphics driver.
     SoftgripError : the recording does not finish loading.
     """
-    choose_vulkan_driver()
-    viewer = Path(sys.executable).with_name("rerun")
-    try:
-        client = ViewerClient.spawn(
-            headless=True,
-            port=_free_port(),
-            hide_welcome_screen=True,
-            executable_path=str(viewer),
-        )
-        client.get_state()
-    except (RuntimeError, ConnectionError) as error:
-        raise MachineError(
-            f"the Rerun viewer does not start ({error})", "Run `make doctor`"
-        ) from error
-    with client:
+    with off_screen_viewer() as client:
         client.open(str(recording.resolve()))
         if step is not None:
             client.set_time(sequence=step)
@@ -76,6 +62,30 @@ def sight_of(recording: Path, step: int | None = None) -> Sight:
         )
         (shown,) = state.recordings
         return Sight(window, views, problems, shown.current_timeline or "")
+
+
+@contextmanager
+def off_screen_viewer() -> Iterator[ViewerClient]:
+    """A viewer without a window, ready to be driven; ended with the block.
+
+    Raises MachineError where it does not start, as without any graphics driver.
+    """
+    choose_vulkan_driver()
+    viewer = Path(sys.executable).with_name("rerun")
+    try:
+        client = ViewerClient.spawn(
+            headless=True,
+            port=_free_port(),
+            hide_welcome_screen=True,
+            executable_path=str(viewer),
+        )
+        client.get_state()
+    except (RuntimeError, ConnectionError) as error:
+        raise MachineError(
+            f"the Rerun viewer does not start ({error})", "Run `make doctor`"
+        ) from error
+    with client:
+        yield client
 
 
 def _settled(client: ViewerClient, recording: Path) -> bytes:

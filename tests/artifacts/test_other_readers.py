@@ -4,6 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from google.protobuf.descriptor_pb2 import FieldDescriptorProto, FileDescriptorProto
+from google.protobuf.descriptor_pool import DescriptorPool
+from google.protobuf.message import Message
+from google.protobuf.message_factory import GetMessageClass
 
 from pipeline.artifacts import ArtifactWriter, Provenance, to_tensor
 from pipeline.artifacts.writing import Compression
@@ -40,3 +44,37 @@ def test_typescript_refuses_what_we_refuse(tmp_path: Path, provenance: Provenanc
     path.write_bytes(data)
     (found,) = by_node([path])
     assert "error" in found
+
+
+def test_what_foxglove_would_not_show_is_named(tmp_path: Path, provenance: Provenance) -> None:
+    """A list of bytes anywhere in a message, and fields that its schema does not know."""
+    lists, unknown = tmp_path / "lists.mcap", tmp_path / "unknown.mcap"
+    with ArtifactWriter(lists, provenance) as artifact:
+        artifact.write("/any", message_with_a_list_of_bytes(), log_time_ns=0)
+    with ArtifactWriter(unknown, provenance) as artifact:
+        field_99 = b"\x98\x06\x01"
+        artifact.write("/any", CatalogueObject.FromString(field_99), log_time_ns=0)
+    said = [found["error"] for found in by_node([lists, unknown])]
+    assert "parts is a list of bytes" in said[0]
+    assert "CatalogueObject: not all of a message is known" in said[1]
+
+
+def message_with_a_list_of_bytes() -> Message:
+    file = FileDescriptorProto(name="parts.proto", package="made.up", syntax="proto3")
+    outer = file.message_type.add(name="Outer")
+    outer.nested_type.add(name="Inner").field.add(
+        name="parts",
+        number=1,
+        label=FieldDescriptorProto.LABEL_REPEATED,
+        type=FieldDescriptorProto.TYPE_BYTES,
+    )
+    outer.field.add(
+        name="inner",
+        number=1,
+        label=FieldDescriptorProto.LABEL_OPTIONAL,
+        type=FieldDescriptorProto.TYPE_MESSAGE,
+        type_name=".made.up.Outer.Inner",
+    )
+    pool = DescriptorPool()
+    pool.Add(file)
+    return GetMessageClass(pool.FindMessageTypeByName("made.up.Outer"))()

@@ -103,6 +103,28 @@ def test_a_cut_file_never_passes_for_the_whole(tmp_path: Path, suffix: str) -> N
             load(path)
 
 
+def test_a_cut_text_file_never_passes_for_the_whole(tmp_path: Path) -> None:
+    path = tmp_path / "box.ply"
+    whole = BOX.export(file_type="ply", encoding="ascii").rstrip()
+    for keep in range(len(whole) // 2, len(whole) - 1):
+        path.write_bytes(whole[:keep])
+        with pytest.raises(MeshError, match=r"box\.ply"):
+            load(path)
+
+
+def test_a_part_placed_too_often_is_refused(tmp_path: Path) -> None:
+    scene = trimesh.Scene()
+    for i in range(4):
+        shift = trimesh.transformations.translation_matrix((0.2 * i, 0, 0))
+        scene.add_geometry(BOX, geom_name="box", transform=shift)
+    path = tmp_path / "boxes.glb"
+    scene.export(path)
+    whole = load_mesh_file(path, tmp_path, "boxes", ObjectsConfig(max_faces=48))
+    assert len(whole.mesh.faces) == 48
+    with pytest.raises(MeshError, match=r"boxes\.glb declares 48 faces, more than the 47 allowed"):
+        load(path, ObjectsConfig(max_faces=47))
+
+
 def test_a_file_over_the_limit_is_refused_unread(tmp_path: Path) -> None:
     path = tmp_path / "big.stl"
     with path.open("wb") as file:

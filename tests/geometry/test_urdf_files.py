@@ -62,6 +62,28 @@ def test_origins_and_fixed_joints_place_the_parts(folder: Path) -> None:
     np.testing.assert_allclose(load(path).bounds, [[-0.01] * 3, [0.11, 0.06, 0.01]], atol=1e-12)
 
 
+def test_a_chain_of_joints_adds_up_from_either_end(folder: Path) -> None:
+    """Links listed from the tip, which hangs on all others, and from the root."""
+    count = 40
+    cube = visual('<box size="0.01 0.01 0.01"/>')
+    for step in (1, -1):
+        joints = "".join(
+            f'<joint name="j{i}" type="fixed"><parent link="l{i}"/><child link="l{i + step}"/>'
+            '<origin xyz="0.02 0 0"/></joint>'
+            for i in range(count)
+            if 0 <= i + step < count
+        )
+        path = write_urdf(folder, *[cube] * count, joints=joints)
+        assert load(path).extents[0] == pytest.approx(0.02 * (count - 1) + 0.01)
+
+
+def test_a_mesh_placed_too_often_is_refused(folder: Path) -> None:
+    path = write_urdf(folder, *[visual('<mesh filename="box.obj" scale="0.001"/>')] * 5)
+    load_object_file(path, folder, "thing", ObjectsConfig(max_faces=60))
+    with pytest.raises(MeshError, match=r"thing\.urdf declares 60 faces, more than the 59"):
+        load_object_file(path, folder, "thing", ObjectsConfig(max_faces=59))
+
+
 def test_solids_have_their_volume(folder: Path) -> None:
     sphere = write_urdf(folder, visual('<sphere radius="0.03"/>'))
     assert load(sphere).volume == pytest.approx(4 / 3 * np.pi * 0.03**3, rel=0.01)

@@ -1,6 +1,7 @@
 // Read MCAP files whole by the MCAP project's TypeScript reader; one line of JSON a file.
 // Checked on the way: CRCs of chunks, attachments, index and data section, and that every
-// message decodes by the schema embedded in the file.
+// message is one that Foxglove shows: decoded by the schema embedded in the file with the same
+// library (protobufjs) in the same way, all of its fields known to that schema.
 import { McapIndexedReader } from "@mcap/core";
 import { loadDecompressHandlers, protobufFromBinaryDescriptor } from "@mcap/support";
 import { crc32 } from "@foxglove/crc";
@@ -31,6 +32,33 @@ async function dataSectionIsWhole(reader, file) {
   return crc32(Buffer.concat(hash)) === reader.dataSectionCrc;
 }
 
+// As Foxglove Studio does (its package mcap-support, parseProtobufSchema), which turns a channel
+// away where any field of its messages, however deep, is a list of bytes.
+function decoderOf(schema) {
+  const root = protobufFromBinaryDescriptor(schema.data);
+  root.resolveAll();
+  const type = root.lookupType(schema.name);
+  refuseListsOfBytes(type, new Set());
+  return (data) => {
+    const message = type.decode(data);
+    type.toObject(message, { defaults: true });
+    if (!Buffer.from(type.encode(message).finish()).equals(data)) {
+      throw new Error(`${schema.name}: not all of a message is known to its schema`);
+    }
+  };
+}
+
+function refuseListsOfBytes(type, seen) {
+  seen.add(type);
+  for (const field of type.fieldsArray) {
+    if (field.type === "bytes" && field.repeated) {
+      throw new Error(`${field.fullName} is a list of bytes, which Foxglove Studio does not read`);
+    }
+    const inner = field.resolvedType;
+    if (inner?.fieldsArray && !seen.has(inner)) refuseListsOfBytes(inner, seen);
+  }
+}
+
 async function contents(path, decompressHandlers) {
   const handle = await open(path, "r");
   try {
@@ -39,14 +67,13 @@ async function contents(path, decompressHandlers) {
     const types = new Map();
     for (const [id, channel] of reader.channelsById) {
       const schema = reader.schemasById.get(channel.schemaId);
-      const root = protobufFromBinaryDescriptor(schema.data);
-      types.set(id, { topic: channel.topic, name: schema.name, type: root.lookupType(schema.name) });
+      types.set(id, { topic: channel.topic, name: schema.name, decode: decoderOf(schema) });
     }
     const counts = {};
     const digest = createHash("sha256");
     for await (const message of reader.readMessages({ validateCrcs: true })) {
-      const { topic, name, type } = types.get(message.channelId);
-      type.decode(message.data);
+      const { topic, name, decode } = types.get(message.channelId);
+      decode(message.data);
       counts[topic] = [name, (counts[topic]?.[1] ?? 0) + 1];
       digest.update(message.data);
     }
