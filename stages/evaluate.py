@@ -13,7 +13,7 @@ from pipeline.artifacts.evaluation_results import Results, results_of
 from pipeline.artifacts.object_messages import read_objects
 from pipeline.artifacts.scene_messages import read_scenes
 from pipeline.artifacts.sharding import is_current
-from pipeline.artifacts.training_messages import read_export
+from pipeline.artifacts.training_messages import EXPORT
 from pipeline.clutter.scene import ClutterScene
 from pipeline.config import RunConfig
 from pipeline.config.evaluation import PolicyName
@@ -121,7 +121,8 @@ def catalogue(objects: Path) -> dict[str, tuple[CatalogueObject, str]]:
 @lru_cache(maxsize=1)
 def network(checkpoint: Path) -> OnnxPredictor:
     """The trained network as exported for control, read once a worker."""
-    return OnnxPredictor(read_export(checkpoint), SCORE_THREADS)
+    with open_artifact(checkpoint) as artifact:
+        return OnnxPredictor(artifact.attachment(EXPORT), SCORE_THREADS)
 
 
 def read_attempts(path: Path) -> list[Attempt]:

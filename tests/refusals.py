@@ -45,14 +45,15 @@ def assert_refused_cheaply(
     told = [json.loads(line) for line in said.stdout.splitlines()]
     assert len(told) == len(names)
     for path, answer in list(zip(names, told, strict=True))[len(honest) :]:
+        sentence, told_of = answer["sentence"], (path.name, answer)
         if path in honest:
-            assert answer["sentence"] == ""
+            assert sentence == "", told_of
         else:
-            assert path.name in answer["sentence"], answer
-            assert "Memory" not in answer["sentence"], answer
-            assert "alloc" not in answer["sentence"], answer
-        assert answer["seconds"] < MOST_SECONDS, (path.name, answer)
-        assert answer["bytes"] < MOST_BYTES, (path.name, answer)
+            assert path.name in sentence, told_of
+            assert "Memory" not in sentence, told_of
+            assert "alloc" not in sentence, told_of
+        assert answer["seconds"] < MOST_SECONDS, told_of
+        assert answer["bytes"] < MOST_BYTES, told_of
 
 
 def _answers(module: str, function: str, names: list[str]) -> None:

@@ -3,12 +3,10 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
-from pipeline.artifacts.reading import open_artifact
 from pipeline.artifacts.tensors import to_tensor
 from pipeline.network.resuming import EpochMetrics
 from pipeline.network.training import TrainedNetwork
@@ -80,18 +78,6 @@ def result_message(trained: TrainedNetwork, figures: TestFigures) -> TrainingRes
         train_count=figures.train_count,
         val_count=figures.val_count,
     )
-
-
-def read_checkpoint(path: Path) -> bytes:
-    """The checkpoint attached to a train artifact."""
-    with open_artifact(path) as artifact:
-        return artifact.attachment(CHECKPOINT)
-
-
-def read_export(path: Path) -> bytes:
-    """The network exported for control, attached to a train artifact."""
-    with open_artifact(path) as artifact:
-        return artifact.attachment(EXPORT)
 
 
 def _numbers(values: Sequence[float | None]) -> Float[np.ndarray, " n"]:

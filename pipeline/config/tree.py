@@ -9,6 +9,7 @@ import difflib
 import hashlib
 import json
 import operator
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,11 @@ from pipeline.config.objects import ObjectsConfig, SplitConfig
 from pipeline.config.scenes import ScenesConfig
 from pipeline.config.section import Section
 from pipeline.errors import ConfigError
+
+# A key a.a.a... costs its reader the square of its parts; strings may hold any number of dots.
+_DEEP_KEY = re.compile(r"(?<![^\s.,=\[\]{}#])(?:[^\s.,=\[\]{}#]+[ \t]*\.[ \t]*){32}")
+_NO_KEY = re.compile(r'"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\'|#[^\n]*')  # strings, comments
+_LONGEST_SHOWN = 80
 
 
 class RunConfig(Section):
@@ -55,14 +61,19 @@ def load_run_config(path: Path) -> RunConfig:
         the tree does not allow; the message names the key and the nearest one.
     """
     try:
-        raw = tomllib.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        if _DEEP_KEY.search(_NO_KEY.sub("q", text)):
+            raise ConfigError(f"{path} holds a key of dozens of parts", "Keys have two or three")
+        raw = tomllib.loads(text)
     except FileNotFoundError as error:
         known = sorted(p.parent.name for p in path.parent.parent.glob("*/run.toml"))
         raise ConfigError(
             f"{path} does not exist",
             f"Create it, or choose one of the runs there are: {', '.join(known) or 'none'}",
         ) from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except RecursionError as error:
+        raise ConfigError(f"{path} nests arrays or tables too deeply", "Mend that line") from error
+    except ValueError as error:  # no TOML, no UTF-8, an integer of thousands of digits
         raise ConfigError(f"{path} is not valid TOML: {error}", "Mend that line") from error
     try:
         return RunConfig.model_validate(raw)
@@ -94,8 +105,17 @@ def _explained(path: Path, error: ValidationError) -> ConfigError:
         remedy = f"Did you mean '{near[0]}'?" if near else f"Known keys: {', '.join(known)}"
         return ConfigError(f"{path}: unknown key '{dotted}'", remedy)
     return ConfigError(
-        f"{path}: '{dotted}' = {problem['input']!r}: {problem['msg']}", "Change the value"
+        f"{path}: '{dotted}' = {_shown(problem['input'])}: {problem['msg']}", "Change the value"
     )
+
+
+def _shown(value: object) -> str:
+    """A value as Python writes it, or its beginning."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # an integer of too many digits, endless nesting
+        return "that"
+    return text if len(text) <= _LONGEST_SHOWN else f"{text[:_LONGEST_SHOWN]}…"
 
 
 def _field_names(location: list[str]) -> list[str]:

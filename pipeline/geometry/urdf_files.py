@@ -124,15 +124,15 @@ def _placed_links(
         above[child.get("link", "")] = (parent.get("link", ""), _origin(label, joint))
     placed: dict[str, Float[np.ndarray, "4 4"]] = {}
     for name in links:
-        chain, at = [], name  # up to a link whose pose is known, each link once
+        chain, at = list[str](), name  # up to a link whose pose is known, each link once
         while at not in placed and at in above and len(chain) < len(links):
             chain.append(at)
             at = above[at][0]
         if at not in placed and (at in above or at not in links):
             raise MeshError(f"{label}: link '{name}' hangs on no root", "Mend its joints")
         pose = placed.setdefault(at, np.eye(4))
-        for child in reversed(chain):
-            pose = placed[child] = pose @ above[child][1]
+        for below in reversed(chain):
+            pose = placed[below] = pose @ above[below][1]
     return [(link, placed[name]) for name, link in links.items()]
 
 

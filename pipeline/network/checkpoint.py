@@ -11,7 +11,7 @@ from safetensors.torch import load, save
 from torch import Tensor
 
 from pipeline.config.learning import NetworkConfig
-from pipeline.errors import ArtifactError, ConfigError
+from pipeline.errors import ConfigError, ContentError
 from pipeline.network.canonical import CHANNELS
 from pipeline.network.ga_cnn import GaCnn, build_network
 
@@ -40,21 +40,21 @@ def load_checkpoint_bytes(data: bytes) -> GaCnn:
 
     Raises
     ------
-    ArtifactError : the bytes are no checkpoint, are damaged, or are of another version.
+    ContentError : the bytes are no checkpoint, are damaged, or are of another version.
     """
     tensors, metadata = tensors_from_bytes(data, "network checkpoint")
     if metadata.get("format") != FORMAT:
-        raise ArtifactError(
+        raise ContentError(
             f"network checkpoint is of format {metadata.get('format')!r}, not {FORMAT!r}", _REMEDY
         )
     if metadata.get("version") != str(FORMAT_VERSION):
-        raise ArtifactError(
+        raise ContentError(
             f"network checkpoint is of version {metadata.get('version')}, "
             f"this program reads version {FORMAT_VERSION}",
             _REMEDY,
         )
     if metadata.get("channels") != json.dumps(CHANNELS):
-        raise ArtifactError(
+        raise ContentError(
             f"network checkpoint expects the input channels {metadata.get('channels')}, "
             f"this program makes {json.dumps(CHANNELS)}",
             _REMEDY,
@@ -66,11 +66,11 @@ def load_checkpoint_bytes(data: bytes) -> GaCnn:
         network.load_state_dict(tensors)
     except (ValidationError, ConfigError, RuntimeError) as error:
         reason = str(error).splitlines()[0]
-        raise ArtifactError(
+        raise ContentError(
             f"network checkpoint does not fit its own configuration: {reason}", _REMEDY
         ) from error
     if not all(bool(torch.isfinite(tensor).all()) for tensor in tensors.values()):
-        raise ArtifactError("network checkpoint holds weights that are not finite", _REMEDY)
+        raise ContentError("network checkpoint holds weights that are not finite", _REMEDY)
     return network.eval()
 
 
@@ -79,7 +79,7 @@ def _check_shapes(config: NetworkConfig, tensors: Mapping[str, Tensor]) -> None:
     with torch.device("meta"):
         expected = {name: tensor.shape for name, tensor in GaCnn(config).state_dict().items()}
     if {name: tensor.shape for name, tensor in tensors.items()} != expected:
-        raise ArtifactError("network checkpoint does not fit its own configuration", _REMEDY)
+        raise ContentError("network checkpoint does not fit its own configuration", _REMEDY)
 
 
 def tensors_to_bytes(tensors: Mapping[str, Tensor], metadata: Mapping[str, str]) -> bytes:
@@ -105,20 +105,22 @@ def tensors_from_bytes(data: bytes, what: str) -> tuple[dict[str, Tensor], dict[
 
     Raises
     ------
-    ArtifactError : the bytes are not whole safetensors; the message calls them ``what``.
+    ContentError : the bytes are not whole safetensors; the message calls them ``what``.
     """
     try:
         tensors = load(data)
         length = int.from_bytes(data[:_HEADER_LENGTH_BYTES], "little")
         end = _HEADER_LENGTH_BYTES + length
         entries = json.loads(data[_HEADER_LENGTH_BYTES:end])
-    except (SafetensorError, ValueError, KeyError) as error:
-        raise ArtifactError(
-            f"{what} is damaged or no safetensors data: {error}", _REMEDY
+    except (SafetensorError, ValueError, KeyError, RuntimeError) as error:
+        # Torch refuses by RuntimeError: sides whose product no integer holds.
+        reason = str(error).splitlines()[0]
+        raise ContentError(
+            f"{what} is damaged or no safetensors data: {reason}", _REMEDY
         ) from error
     metadata = entries.get("__metadata__", {})
     if metadata.pop(_DIGEST_KEY, None) != _digest(entries, data[end:]):
-        raise ArtifactError(f"{what} is damaged: its SHA-256 does not match its content", _REMEDY)
+        raise ContentError(f"{what} is damaged: its SHA-256 does not match its content", _REMEDY)
     return tensors, metadata
 
 

@@ -2,6 +2,7 @@
 
 import json
 import logging
+import math
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -23,7 +24,7 @@ from onnxruntime.capi.onnxruntime_pybind11_state import (
     NotImplemented as OperatorNotImplemented,
 )
 
-from pipeline.errors import ArtifactError
+from pipeline.errors import ArtifactError, ContentError
 from pipeline.network.canonical import CHANNELS, network_input
 from pipeline.network.ga_cnn import GaCnn
 from pipeline.network.inference import predict
@@ -37,6 +38,15 @@ LARGEST_DIFFERENCE = 1e-4
 _INPUT, _OUTPUT = "inputs", "quality"
 _CELLS = 24
 _REMEDY = "Export the network again."
+# All that a GA-CNN is exported to: nothing that makes large arrays of small ones.
+_OPERATORS = frozenset(
+    (
+        *("Add", "AveragePool", "Concat", "Conv", "Gemm", "Mul", "ReduceMax", "ReduceMean"),
+        *("Relu", "Sigmoid", "Squeeze", "Unsqueeze"),
+    )
+)
+# Of one sample, between two layers: 512 channels of all cells are a seventh of it.
+_MOST_VALUES = 1 << 21
 _REFUSALS = (
     *(Fail, InvalidArgument, InvalidGraph, InvalidProtobuf),
     *(OperatorNotImplemented, RuntimeException),
@@ -73,17 +83,18 @@ class OnnxPredictor:
 
         Raises
         ------
-        ArtifactError : the bytes are no such export, or of another version.
+        ContentError : the bytes are no such export, or of another version.
         """
         try:
             model = onnx.load_from_string(data)
         except DecodeError as error:
-            raise ArtifactError(f"exported network is damaged: {error}", _REMEDY) from error
+            raise ContentError(f"exported network is damaged: {error}", _REMEDY) from error
         if any(weights.data_location != onnx.TensorProto.DEFAULT for weights in _weights(model)):
-            raise ArtifactError("exported network refers to weights in other files", _REMEDY)
+            raise ContentError("exported network refers to weights in other files", _REMEDY)
+        _check_bounded(model)
         properties = {p.key: p.value for p in model.metadata_props}
         if properties != _metadata():
-            raise ArtifactError(
+            raise ContentError(
                 f"exported network is marked {properties}, this program reads {_metadata()}",
                 _REMEDY,
             )
@@ -98,7 +109,7 @@ class OnnxPredictor:
             )
         # Its messages may quote the bytes of a damaged model, which need not be text.
         except (*_REFUSALS, RuntimeError, UnicodeDecodeError) as error:
-            raise ArtifactError(f"exported network cannot be run: {error}", _REMEDY) from error
+            raise ContentError(f"exported network cannot be run: {error}", _REMEDY) from error
 
     def predict(
         self,
@@ -150,6 +161,39 @@ def _weights(model: onnx.ModelProto) -> Iterator[onnx.TensorProto]:
         for attribute in node.attribute:
             yield attribute.t
             yield from attribute.tensors
+
+
+def _check_bounded(model: onnx.ModelProto) -> None:
+    """Hold what a model would allocate, loaded or run, against what a GA-CNN needs.
+
+    A session folds what does not depend on its input when it is made, whatever it grows to.
+    """
+    graph = model.graph
+    unknown = sorted({node.op_type for node in graph.node} - _OPERATORS)
+    if unknown or model.functions or graph.sparse_initializer:
+        what = ", ".join(unknown) or "functions or sparse weights"
+        raise ContentError(f"exported network holds {what[:80]}, which GA-CNN does not", _REMEDY)
+    live = {value.name for value in graph.input} - {weights.name for weights in graph.initializer}
+    for node in graph.node:
+        if not live.intersection(node.input):
+            raise ContentError("exported network computes what no input changes", _REMEDY)
+        live.update(node.output)
+    try:
+        inferred = onnx.shape_inference.infer_shapes(model, strict_mode=True).graph
+    except onnx.shape_inference.InferenceError as error:
+        reason = str(error).splitlines()[0]
+        raise ContentError(f"exported network is damaged: {reason}", _REMEDY) from error
+    known = {value.name: value.type.tensor_type.shape for value in inferred.value_info}
+    known |= {value.name: value.type.tensor_type.shape for value in inferred.output}
+    batch = graph.input[0].type.tensor_type.shape.dim[0].dim_param if graph.input else ""
+    for name in (name for node in graph.node for name in node.output):
+        sides = list(known[name].dim) if name in known else []
+        values = math.prod(int(side.dim_value) for side in sides[1:])  # 0 where one is unknown
+        if not sides or sides[0].dim_param != batch or not 0 < values <= _MOST_VALUES:
+            raise ContentError(
+                f"exported network makes more of '{name}' than {_MOST_VALUES} values a sample",
+                _REMEDY,
+            )
 
 
 def _metadata() -> dict[str, str]:

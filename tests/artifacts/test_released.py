@@ -15,7 +15,7 @@ from pipeline.artifacts.object_messages import read_objects
 from pipeline.artifacts.sample_messages import samples_of
 from pipeline.artifacts.scene_messages import read_scenes
 from pipeline.artifacts.sharding import listed_shards, read_index
-from pipeline.artifacts.training_messages import read_checkpoint, read_export
+from pipeline.artifacts.training_messages import CHECKPOINT, EXPORT
 from pipeline.network.checkpoint import load_checkpoint_bytes
 from pipeline.network.export import OnnxPredictor
 from schemas.compatibility import read_released, versions
@@ -75,11 +75,11 @@ def test_training(released: Path) -> None:
     with open_artifact(released / "train.mcap") as artifact:
         result = artifact.one(TrainingResult)
         assert len(list(artifact.messages(Epoch))) == 2
+        network = load_checkpoint_bytes(artifact.attachment(CHECKPOINT))
+        predictor = OnnxPredictor(artifact.attachment(EXPORT), threads=1)
     assert 0 < result.test_mae < 1
-    network = load_checkpoint_bytes(read_checkpoint(released / "train.mcap"))
     assert network.config.layers == result.layers
     cloud = np.zeros((1, 24, 24, 3), dtype=np.float16)
-    predictor = OnnxPredictor(read_export(released / "train.mcap"), threads=1)
     (predicted,) = predictor.predict(cloud, np.ones((1, 24, 24), dtype=bool), 1)
     assert 0 <= predicted <= 1
 

@@ -7,6 +7,7 @@ from pydantic import ValidationError
 
 from pipeline.config import GripperConfig, RunConfig, load_run_config, section_digest
 from pipeline.errors import ConfigError
+from tests.refusals import assert_refused_cheaply
 
 RUNS = Path(__file__).resolve().parents[2] / "runs"
 
@@ -53,6 +54,44 @@ def test_what_is_wrong_is_said(tmp_path: Path, text: str, said: str) -> None:
     with pytest.raises(ConfigError, match=said) as caught:
         load(tmp_path, text)
     assert str(tmp_path / "run.toml") in str(caught.value)
+
+
+# By what they nest or count without end; the longer ones cost a reader the square of their length.
+HOSTILE = {
+    "open_arrays": "seed = " + "[" * 900,
+    "arrays": "seed = " + "[" * 30_000 + "]" * 30_000,
+    "tables": f"[{'.'.join('a' * 30_000)}]",
+    "dotted": f"objects.{'.'.join('a' * 30_000)} = 1",
+    "quoted": ".".join(['"a b"'] * 10_000) + " = 1",
+    "inline": "seed = " + "{a=" * 10_000 + "1" + "}" * 10_000,
+    "digits": "seed = " + "9" * 5_000,
+    "hexadecimal": "seed = 0x" + "f" * 30_000,
+    "float": "scenes.levels = [1e999999999]",
+    "word": "x = " + "a" * 60_000,
+    "quotes": "objects = " + '"' * 60_001,
+    "zeros": "\0" * 1_000,
+    "channels": "network.channels = [1_000_000_000_000, 8, 8, 8]",
+}
+
+
+def test_endless_nesting_and_counts_cost_nothing(tmp_path: Path) -> None:
+    hostile = []
+    for name, text in HOSTILE.items():
+        hostile.append(tmp_path / f"{name}.toml")
+        hostile[-1].write_text(text)
+    assert_refused_cheaply(load_run_config, sorted(RUNS.glob("*/run.toml")), hostile)
+
+
+def test_a_long_value_is_told_by_its_beginning(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match=r"'seed' = 9{80}…: Input") as caught:
+        load(tmp_path, "seed = " + "9" * 2_000)
+    assert len(str(caught.value)) < 300
+
+
+def test_strings_may_hold_many_dots(tmp_path: Path) -> None:
+    pattern = ".".join("abc" * 40)
+    config = load(tmp_path, f'objects.transparent = ["{pattern}"] # {pattern}x')
+    assert config.objects.transparent == (pattern,)
 
 
 def test_an_absent_run_names_those_there_are(tmp_path: Path) -> None:
