@@ -5,6 +5,7 @@ from typing import cast
 
 import numpy as np
 
+from pipeline.artifacts.names import file_name
 from pipeline.artifacts.reading import open_artifact
 from pipeline.artifacts.tensors import from_tensor, tensors_of, to_tensor
 from pipeline.errors import ContentError
@@ -48,12 +49,12 @@ def object_of(message: objects_pb2.CatalogueObject) -> CatalogueObject:
 
     Raises
     ------
-    ContentError : it has no such class, or a mesh that is none.
+    ContentError : it has no such class, a mesh that is none, or a name that is no file's.
     """
     if message.shape_class not in set(ShapeClass):
         raise ContentError(f"'{message.name}' is of class '{message.shape_class}'")
     return CatalogueObject(
-        name=message.name,
+        name=file_name(message.name),
         source=message.source,
         source_sha256=message.source_sha256,
         unit=message.unit,

@@ -18,6 +18,7 @@ from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 from google.protobuf.timestamp_pb2 import Timestamp
 
+from pipeline.artifacts.names import file_name
 from pipeline.artifacts.reading import Artifact, open_artifact
 from pipeline.artifacts.tensors import from_tensor, to_tensor
 from pipeline.artifacts.writing import ArtifactWriter
@@ -117,7 +118,7 @@ def read_scenes(path: Path) -> Iterator[ClutterScene]:
 def _scene(artifact: Artifact, message: scenes_pb2.Scene, time_ns: int) -> ClutterScene:
     contacts = from_tensor(message.contacts)
     return ClutterScene(
-        scene_id=message.scene_id,
+        scene_id=file_name(message.scene_id),
         level=message.level,
         split=message.split,
         seed=message.seed,

@@ -52,7 +52,7 @@ def test_a_flipped_bit_anywhere_is_refused_or_without_effect(
     path = tmp_path / "objects.mcap"
     write_objects(path, provenance, 3, compression)
     whole, data = everything_in(path), path.read_bytes()
-    for at in range(0, len(data), 3):
+    for at in range(0, len(data), 3 if compression == "zstd" else 7):
         flipped = bytearray(data)
         flipped[at] ^= 1 << (at % 8)
         path.write_bytes(flipped)

@@ -23,13 +23,12 @@ from pipeline.artifacts.grasp_messages import GraspOrigin, LabelledGrasps, grasp
 from pipeline.artifacts.inspection import contents_of, verified
 from pipeline.artifacts.object_messages import object_of
 from pipeline.artifacts.sample_messages import Samples, sample_batch, samples_of
+from pipeline.artifacts.training_messages import CHECKPOINT, EXPORT
 from pipeline.config import ObjectsConfig, load_run_config
-from pipeline.config.learning import NetworkConfig
 from pipeline.errors import SoftgripError
 from pipeline.geometry.mesh_files import MESH_SUFFIXES, load_mesh_file
-from pipeline.network.checkpoint import _digest, load_checkpoint_bytes, save_checkpoint_bytes
-from pipeline.network.export import OnnxPredictor, export_onnx_bytes
-from pipeline.network.ga_cnn import build_network
+from pipeline.network.checkpoint import _digest, load_checkpoint_bytes
+from pipeline.network.export import OnnxPredictor
 from schemas.softgrip.v1.grasps_pb2 import GraspBatch, ShardIndex
 from schemas.softgrip.v1.objects_pb2 import CatalogueObject
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
@@ -131,9 +130,9 @@ def mcap_seeds() -> Iterator[bytes]:
 
 def checkpoint_seeds() -> Iterator[bytes]:
     """A small network, as a checkpoint and exported."""
-    network = build_network(NetworkConfig(layers=18, channels=(8, 8, 8, 8)), seed=0)
-    data = save_checkpoint_bytes(network)
-    yield from (b"\0" + data, b"\1" + data, b"\2" + export_onnx_bytes(network))
+    with open_artifact(ROOT / "tests/artifacts/released/v1-0.1.0/train.mcap") as artifact:
+        data, exported = artifact.attachment(CHECKPOINT), artifact.attachment(EXPORT)
+    yield from (b"\0" + data, b"\1" + data, b"\2" + exported)
 
 
 def with_index_checksum(data: bytes) -> bytes:
@@ -215,6 +214,19 @@ def _grasps(rng: np.random.Generator) -> GraspBatch:
     return grasp_batch(origin, grasps)
 
 
+def read_any(data: bytes) -> None:
+    """By the first byte, one of the others: all of them searched by one process."""
+    if data:
+        read, _ = KINDS[data[0] % len(KINDS)]
+        read(data[1:])
+
+
+def any_seeds() -> Iterator[bytes]:
+    """All of the others'."""
+    for number, (_, seeds) in enumerate(KINDS):
+        yield from (bytes([number]) + data for data in seeds())
+
+
 def answered(read: Callable[[bytes], None], data: bytes) -> str:
     """What a reader says of some bytes: its error in words, or that it read them."""
     try:
@@ -224,9 +236,12 @@ def answered(read: Callable[[bytes], None], data: bytes) -> str:
     return "read"
 
 
-READERS: dict[str, tuple[Callable[[bytes], None], Callable[[], Iterator[bytes]]]] = {
+Reader = tuple[Callable[[bytes], None], Callable[[], Iterator[bytes]]]
+READERS: dict[str, Reader] = {
     "mesh": (read_mesh, mesh_seeds),
     "toml": (read_toml, toml_seeds),
     "mcap": (read_mcap, mcap_seeds),
     "checkpoint": (read_checkpoint, checkpoint_seeds),
 }
+KINDS = tuple(READERS.values())
+READERS["any"] = (read_any, any_seeds)

@@ -7,16 +7,16 @@ from pathlib import Path
 
 import pytest
 
-from tests.fuzz.readers import READERS, ROOT, answered
+from tests.fuzz.readers import KINDS, READERS, ROOT, answered
 
 FAILURES = Path(__file__).parent / "failures"
-SECONDS = 4
+SECONDS = 8
+FORBIDDEN = ("torch.load", "torch.save", "eval", "exec")
 PICKLES = {"pickle", "cPickle", "_pickle", "dill", "cloudpickle", "joblib", "shelve", "marshal"}
 
 
-@pytest.mark.parametrize("reader", READERS)
-def test_whole_files_are_read(reader: str) -> None:
-    read, seeds = READERS[reader]
+def test_whole_files_are_read() -> None:
+    read, seeds = READERS["any"]
     assert {answered(read, data) for data in seeds()} == {"read"}
 
 
@@ -31,12 +31,12 @@ def test_what_was_found_is_answered(found: Path) -> None:
     assert answered(read, found.read_bytes())
 
 
-@pytest.mark.parametrize("reader", READERS)
-def test_a_short_search_finds_nothing(reader: str, tmp_path: Path) -> None:
+def test_a_short_search_finds_nothing(tmp_path: Path) -> None:
+    """Of all readers by one process: most of its time goes into instrumenting their code."""
     pytest.importorskip("atheris", reason="atheris has no wheel for this Python")
     done = subprocess.run(
         [
-            *(sys.executable, "-m", "tests.fuzz", reader, "--seconds", str(SECONDS)),
+            *(sys.executable, "-m", "tests.fuzz", "any", "--seconds", str(SECONDS)),
             *("--failures", str(tmp_path / "failures"), "--corpus", str(tmp_path / "corpus")),
         ],
         cwd=ROOT,
@@ -45,8 +45,16 @@ def test_a_short_search_finds_nothing(reader: str, tmp_path: Path) -> None:
         check=False,
     )
     assert done.returncode == 0, done.stderr[-3000:]
-    assert list((tmp_path / "corpus" / reader).iterdir())
-    assert not list((tmp_path / "failures" / reader).iterdir())
+    reached = {path.read_bytes()[0] for path in (tmp_path / "corpus" / "any").iterdir()}
+    assert len({first % len(KINDS) for first in reached}) == len(KINDS)
+    assert not list((tmp_path / "failures" / "any").iterdir())
+
+
+def name_of(called: ast.expr) -> str:
+    """``f`` and ``module.f`` as they are written; of anything longer nothing."""
+    if isinstance(called, ast.Attribute) and isinstance(called.value, ast.Name):
+        return f"{called.value.id}.{called.attr}"
+    return called.id if isinstance(called, ast.Name) else ""
 
 
 def test_nothing_is_ever_unpickled() -> None:
@@ -61,8 +69,7 @@ def test_nothing_is_ever_unpickled() -> None:
             elif isinstance(node, ast.ImportFrom):
                 assert (node.module or "").split(".")[0] not in PICKLES, where
             elif isinstance(node, ast.Call):
-                called = ast.unparse(node.func)
-                assert called not in ("torch.load", "torch.save", "eval", "exec"), where
+                assert name_of(node.func) not in FORBIDDEN, where
                 for keyword in node.keywords:
                     assert keyword.arg != "allow_pickle" or not ast.literal_eval(keyword.value), (
                         where

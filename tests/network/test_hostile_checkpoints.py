@@ -96,7 +96,7 @@ def node(
     operator: str, *inputs: str, to: str = "q", **attributes: int | list[int]
 ) -> onnx.NodeProto:
     made = helper.make_node(operator, inputs, [to])
-    made.attribute.extend(helper.make_attribute(key, to) for key, to in attributes.items())
+    made.attribute.extend(helper.make_attribute(key, value) for key, value in attributes.items())
     return made
 
 
