@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from pipeline.artifacts.provenance import Input, Provenance
@@ -64,12 +65,8 @@ def verified(path: Path, mesh_dir: Path | None) -> Iterator[Finding]:
     Every byte of every artifact is read. A file is looked at once, however many name it.
     """
     run = run_folder(path)
-    digests: dict[Path, str] = {}
-
-    def digest(file: Path) -> str:
-        return digests.setdefault(file, file_sha256(file))
-
-    waiting, seen = [path], set()
+    digest = cache(file_sha256)
+    waiting, seen = [path.resolve()], set()
     while waiting:
         file = waiting.pop()
         if file in seen:
@@ -83,8 +80,9 @@ def verified(path: Path, mesh_dir: Path | None) -> Iterator[Finding]:
         yield Finding(file)
         for entry in shards:
             found = _compared(entry, file.parent, file, digest)
-            yield found
-            if not found.problem:
+            if found.problem:
+                yield found
+            else:
                 waiting.append(found.path)
         for entry in inputs:
             is_mesh = entry.path.startswith(MESHES)

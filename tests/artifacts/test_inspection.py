@@ -63,8 +63,9 @@ def test_contents_are_told(run: Path, provenance: Provenance) -> None:
 def test_a_whole_chain_is_followed_to_the_mesh_each_file_once(run: Path) -> None:
     found = [f.path.name for f in verified(run / "grasps.mcap", run / "meshes")]
     assert problems(run) == {}
-    assert {"grasps.mcap", "objects.mcap", "cube.ply"} <= set(found)
-    assert found.count("objects.mcap") == 1
+    shards = {f"{index:05d}-of-00002.mcap" for index in range(2)}
+    assert set(found) == {"grasps.mcap", "objects.mcap", "cube.ply", *shards}
+    assert len(found) == len(set(found))
 
 
 def test_a_changed_mesh_is_found_from_the_last_stage(run: Path) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.artifacts import open_artifact, read_provenance
+from pipeline.artifacts.inspection import verified
 from pipeline.artifacts.object_messages import read_objects
 from pipeline.artifacts.scene_messages import read_scenes
 from pipeline.execution import RunFolder
@@ -44,6 +45,12 @@ def test_a_second_run_of_any_stage_does_nothing(run: RunFolder) -> None:
         assert done.returncode == 0
         assert f"{name}: up to date, nothing to do" in done.stderr
     assert digests(run) == before
+
+
+def test_every_file_is_verified_from_the_last_stage(run: RunFolder) -> None:
+    found = list(verified(run.artifact("evaluate"), None))
+    assert [f for f in found if f.problem] == []
+    assert {f.path.resolve() for f in found} >= {f.resolve() for f in run.path.rglob("*.mcap")}
 
 
 def test_no_object_is_in_two_splits(run: RunFolder) -> None:
