@@ -43,6 +43,7 @@ from pipeline.gripper.balancing import flattened, quality_histogram, rare_grasps
 from pipeline.gripper.draping import drape
 from pipeline.gripper.heights import pad_heights
 from pipeline.gripper.limits import LIMIT_NAMES
+from pipeline.gripper.quality import triangle_pressure
 from pipeline.gripper.sampling import (
     Candidates,
     Proposal,
@@ -347,11 +348,17 @@ def shown_grasps(
     rays, _ = ray_scene(scene, meshes, config)
     frames = np.array([grasps.world_from_gripper[row] for _, grasps, row in chosen])
     heights, _ = pad_heights(frames, rays, pad_of(config), config.grasps.clearance_m)
+    pad = pad_of(config)
     return [
-        ShownGrasp(scene, origin, grasps, row, draped)
-        for (origin, grasps, row), draped in zip(
-            chosen, drape(pad_of(config), heights), strict=True
+        ShownGrasp(
+            scene,
+            origin,
+            grasps,
+            row,
+            draped,
+            triangle_pressure(pad, config.gripper, draped, grasps.contact_mask[row]),
         )
+        for (origin, grasps, row), draped in zip(chosen, drape(pad, heights), strict=True)
     ]
 
 

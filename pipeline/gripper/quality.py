@@ -86,6 +86,30 @@ def quality_of(problem: QualityProblem, solution: QpSolution) -> float:
     return math.exp(-problem.scale * float(np.linalg.norm(wrench - problem.target)))
 
 
+def triangle_pressure(
+    pad: Pad,
+    config: GripperConfig,
+    draped_m: Float[np.ndarray, " vertices"],
+    vertex_contact: Bool[np.ndarray, " vertices"],
+) -> Float[np.ndarray, " triangles"]:
+    """Pull on each triangle of a draped pad per area, over that of a full seal: p w_j [1].
+
+    p is Eq. (2)'s, w_j the optimum's of Eq. (14); 0 where a triangle is not in contact. Where no
+    W keeps the limits, w_j is 1.
+
+    Parameters
+    ----------
+    draped_m : z(v) of S-1.07, from any origin [m].
+    vertex_contact : which vertices are in contact with the target.
+    """
+    pressure = np.zeros(len(pad.triangles))
+    contact = contact_of(pad, draped_m, vertex_contact)
+    if contact.triangles.size:
+        solution = SOLVERS[config.solver](quality_problem(pad, config, contact))
+        pressure[contact.triangles] = contact.pressure * solution.weights
+    return pressure
+
+
 def label_reference(
     pad: Pad,
     config: GripperConfig,

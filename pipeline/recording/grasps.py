@@ -23,6 +23,8 @@ from pipeline.recording.recording import looking, name_curve, numbered, step, ti
 from pipeline.recording.shapes import shown_mesh, shown_pose
 
 TIMELINE = "grasp"
+FULL_PRESSURE = 1.1  # p w_j of a full seal where w_j is greatest, with sigma_W of Eq. (13)
+VIEW = f"Pad by p w_j (dark 0, yellow {FULL_PRESSURE}; red: lifted), wrench, cloud; in GCS"
 LIFTED = colours.PALETTE[5]
 LIFT_M = 3e-4  # the pad is drawn this much above what it lies on
 ARROW_M = 0.04  # a full seal's force is drawn this long
@@ -32,13 +34,18 @@ NEAR_M = 0.12  # other objects are drawn when this near
 
 @dataclass(frozen=True)
 class ShownGrasp:
-    """One grasp of the recording. pad_height_m : (v,) draped pad, z in GCS at first touch."""
+    """One grasp of the recording.
+
+    pad_height_m : draped pad, z in GCS at first touch.
+    pad_pressure : p w_j of each triangle, as in `triangle_pressure`.
+    """
 
     scene: ClutterScene
     origin: GraspOrigin
     grasps: LabelledGrasps
     row: int
     pad_height_m: Float[np.ndarray, " v"]
+    pad_pressure: Float[np.ndarray, " t"]
 
 
 def blueprint() -> rrb.Blueprint:
@@ -47,7 +54,7 @@ def blueprint() -> rrb.Blueprint:
         rrb.Horizontal(
             rrb.Spatial3DView(
                 origin="/world",
-                name="Pad by pressure (dark 0, yellow 1; red: lifted), wrench, cloud; in GCS",
+                name=VIEW,
                 eye_controls=looking((-0.09, -0.13, 0.11), (0.0, 0.0, -0.01)),
             ),
             rrb.Vertical(
@@ -112,19 +119,18 @@ def _show_surroundings(
 
 
 def _show_pad(stream: rr.RecordingStream, shown: ShownGrasp, pad: Pad) -> None:
-    """The draped pad, where it touches in the colour of its pressure; the cloud; the wrench."""
+    """The draped pad by p w_j, the rest of it lifted; the cloud; the wrench."""
     grasps, row = shown.grasps, shown.row
-    contact = grasps.contact_mask[row]
     vertices = np.column_stack([pad.vertices_xy_m, shown.pad_height_m + LIFT_M])
-    sealing = contact[pad.triangles].all(axis=1)
-    pressure = colours.by_value(grasps.pressure[row : row + 1])
-    per_vertex = np.where(contact[:, None], pressure, LIFTED).astype(np.uint8)
+    sealing = grasps.contact_mask[row][pad.triangles].all(axis=1)
+    pressure = colours.by_value(shown.pad_pressure / FULL_PRESSURE)
+    colour = np.where(sealing[:, None], pressure, LIFTED).astype(np.uint8)
+    # A triangle in a colour of its own shares no vertex.
     stream.log(
         "world/pad",
         rr.Mesh3D(
-            vertex_positions=vertices,
-            triangle_indices=np.concatenate([pad.triangles[sealing], pad.triangles[~sealing]]),
-            vertex_colors=per_vertex,
+            vertex_positions=vertices[pad.triangles].reshape(-1, 3),
+            vertex_colors=np.repeat(colour, 3, axis=0),
         ),
     )
     seen = grasps.cloud_mask[row]

@@ -12,7 +12,7 @@ from pipeline.config import GripperConfig, PadConfig
 from pipeline.gripper import GraspStatus, Pad, build_pad, label, label_batch, label_reference
 from pipeline.gripper.contact import Contact, contact_of
 from pipeline.gripper.draping import contact_vertices, drape
-from pipeline.gripper.quality import quality_of, quality_problem
+from pipeline.gripper.quality import quality_of, quality_problem, triangle_pressure
 from pipeline.gripper.solvers import structured
 from pipeline.gripper.wrench import vacuum_force, wrench_matrix
 from tests.gripper.surfaces import cylinder, everywhere, plane, sphere, tilted
@@ -267,6 +267,32 @@ def test_renaming_contact_triangles_changes_nothing(seed: int) -> None:
     assert answers[0].status is answers[1].status
     q = [quality_of(problem, answer) for problem, answer in zip(problems, answers, strict=True)]
     assert q[0] == pytest.approx(q[1], abs=1e-6)
+
+
+def pressure_on(pad: Pad, heights: np.ndarray) -> np.ndarray:
+    draped = drape(pad, heights[None])[0]
+    touching = contact_vertices(pad, draped, heights, everywhere(pad))
+    return triangle_pressure(pad, CONFIG, draped, touching)
+
+
+def test_every_triangle_of_a_plane_pulls_with_p() -> None:
+    # Every W whose F_z is 1 is optimal there; the solver's lies in their midst.
+    np.testing.assert_allclose(pressure_on(PAD, plane(PAD)), 1.0, atol=1e-3)
+    assert not pressure_on(PAD, np.full(586, -np.inf)).any()
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.integers(1, 585), max_size=40))
+def test_the_pull_of_flat_triangles_adds_up_to_f_z(holes: list[int]) -> None:
+    heights = plane(PAD)
+    heights[holes] = -np.inf
+    result = label(PAD, CONFIG, heights, everywhere(PAD))
+    pressure = pressure_on(PAD, heights)
+    touching = result.contact[PAD.triangles].all(axis=1)
+    assert not pressure[~touching].any()
+    assert pressure @ PAD.areas_m2 / PAD.area_m2 == pytest.approx(result.wrench[2], abs=1e-6)
+    deviation = np.abs(pressure[touching] - result.pressure)
+    assert (deviation <= CONFIG.weight_spread * result.pressure + 1e-9).all()
 
 
 def test_the_compiled_batch_is_the_reference_in_every_field() -> None:

@@ -59,7 +59,7 @@ def test_the_viewer_shows_all_of_it(seen: tuple[str, Sight], empty_share: float)
     spatial = {
         "objects": "Catalogue, coloured by class, NSVR growing",
         "scenes": "Scene, cameras and coloured cloud",
-        "grasps": "Pad by pressure (dark 0, yellow 1; red: lifted), wrench, cloud; in GCS",
+        "grasps": "Pad by p w_j (dark 0, yellow 1.1; red: lifted), wrench, cloud; in GCS",
         "shards": "Clouds by growing q, units of r_G",
         "train": "Worst test samples: q / q-hat",
         "evaluate": "Scene, gripper and its path, candidates by q-hat",
