@@ -25,7 +25,7 @@ from pipeline.benchmarks.clock import Laps
 from pipeline.clutter.scene import ClutterScene
 from pipeline.config import RunConfig, load_run_config
 from pipeline.config.grasps import SolverName
-from pipeline.execution import RunFolder, generator, run_in_order
+from pipeline.execution import RunFolder, generator, run_command, run_in_order
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.shape import ShapeClass
@@ -77,7 +77,7 @@ class Bench:
     objects: dict[str, CatalogueObject]
 
 
-def main() -> int:
+def measure_all() -> None:
     """Measure, print the table, write bench.json."""
     bench = opened(RunFolder(RUNS_DIR / "bench"))
     figures: dict[str, object] = {"cores": len(os.sched_getaffinity(0))}
@@ -101,7 +101,6 @@ def main() -> int:
     path = bench.folder.path / "bench.json"
     publish_bytes(path, (json.dumps(figures, indent=1) + "\n").encode())
     sys.stdout.write(f"peak memory {figures['peak_memory_mib']} MiB; all of it in {path}\n")
-    return 0
 
 
 def opened(folder: RunFolder) -> Bench:
@@ -116,16 +115,25 @@ def opened(folder: RunFolder) -> Bench:
     )
 
 
+def labelled_scene(
+    bench: Bench, scene: ClutterScene, wanted: int, rng: np.random.Generator
+) -> list[tuple[GraspOrigin, LabelledGrasps]]:
+    """Scene to grasps, its ray scene included."""
+    return synthesize(
+        scene, ray_scene(scene, bench.meshes, bench.config), bench.config, wanted, rng
+    )
+
+
 def end_to_end(bench: Bench) -> dict[str, object]:
     """Scene to shard on one core: labelled and kept grasps a second, everything included."""
     config, wanted = bench.config, bench.config.grasps.count // len(bench.scenes)
     provenance = storage.PROVENANCE
-    synthesize(bench.scenes[0], bench.meshes, config, 32, np.random.default_rng(0))  # compiled
+    labelled_scene(bench, bench.scenes[0], 32, np.random.default_rng(0))  # compiled
     started, kept = time.perf_counter(), 0
     with tempfile.TemporaryDirectory() as scratch:
         for index, scene in enumerate(bench.scenes):
             rng = generator(config.seed, "bench", scene.scene_id)
-            batches = synthesize(scene, bench.meshes, config, wanted, rng)
+            batches = labelled_scene(bench, scene, wanted, rng)
             with ArtifactWriter(Path(scratch) / f"{index}.mcap", provenance) as artifact:
                 for origin, grasps in batches:
                     artifact.write("/grasps", grasp_batch(origin, grasps), log_time_ns=0)
@@ -158,7 +166,7 @@ def phases(bench: Bench) -> dict[str, object]:
     measured = disturb(view, rng)
     sub_clouds(measured, view.camera, frames, config.sensing, pad.radius_m)
     laps.lap("sub cloud")
-    batches = synthesize(scene, bench.meshes, config, 1024, rng)
+    batches = labelled_scene(bench, scene, 1024, rng)
     laps.start()
     with (
         tempfile.TemporaryDirectory() as scratch,
@@ -262,9 +270,7 @@ def stored_samples(bench: Bench) -> Samples:
     rng = np.random.default_rng(0)
     wanted = STORED_SAMPLES // len(bench.scenes)
     grasps = [
-        part
-        for scene in bench.scenes
-        for _, part in synthesize(scene, bench.meshes, bench.config, wanted, rng)
+        part for scene in bench.scenes for _, part in labelled_scene(bench, scene, wanted, rng)
     ]
     cloud = np.concatenate([part.cloud for part in grasps])
     count = len(cloud)
@@ -355,4 +361,4 @@ def settling(bench: Bench) -> dict[str, object]:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_command(measure_all)

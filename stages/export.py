@@ -1,7 +1,6 @@
 """`make export`: a run's dataset in a format that other grasp-learning code already loads."""
 
 import json
-import sys
 from collections.abc import Iterator, Mapping
 from enum import StrEnum
 from functools import partial
@@ -24,8 +23,8 @@ from pipeline.artifacts.object_messages import read_objects
 from pipeline.artifacts.sample_messages import Samples, joined_samples, samples_of
 from pipeline.artifacts.sharding import listed_shards
 from pipeline.config import load_run_config
-from pipeline.errors import ArtifactError, MachineError, SoftgripError
-from pipeline.execution import RunFolder, progress
+from pipeline.errors import ArtifactError, MachineError
+from pipeline.execution import RunFolder, progress, run_command
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.interchange.graspgen import write_graspgen, write_lists
 from pipeline.interchange.object_grasps import ObjectGrasps, base_in_object
@@ -198,12 +197,4 @@ def export(
 
 
 if __name__ == "__main__":
-    logger.remove()
-    logger.add(sys.stderr, level="INFO", format="{message}")
-    app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-    app.command()(export)
-    try:
-        app()
-    except SoftgripError as error:
-        logger.error("export: {}", error)
-        sys.exit(1)
+    run_command(export)

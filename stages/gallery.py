@@ -1,11 +1,12 @@
 """`make gallery`: the first clutter of each level, rendered large, on one sheet."""
 
 import io
-import os
-import sys
 from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+import typer
 from loguru import logger
 
 from pipeline.artifacts import publish_bytes
@@ -14,8 +15,8 @@ from pipeline.artifacts.scene_messages import read_scenes
 from pipeline.clutter.gaps import bounds_of
 from pipeline.clutter.scene import ClutterScene
 from pipeline.config import StaticCameraConfig, load_run_config
-from pipeline.errors import ArtifactError, SoftgripError
-from pipeline.execution import RunFolder
+from pipeline.errors import ArtifactError
+from pipeline.execution import RunFolder, run_command
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.recording.gallery import contact_sheet
 from pipeline.sensing.cameras import PinholeCamera, camera_at
@@ -70,11 +71,13 @@ def portrait_camera(scene: ClutterScene, objects: dict[str, CatalogueObject]) ->
     return replace(camera, near_m=0.05)
 
 
+def gallery(
+    run: Annotated[str, typer.Option(envvar="RUN", help="name of the run")] = "default",
+    runs_dir: Annotated[Path, typer.Option(help="folder of all runs")] = RUNS_DIR,
+) -> None:
+    """Render the nine levels on one sheet, runs/<run>/gallery.png."""
+    make_gallery(RunFolder(runs_dir / run))
+
+
 if __name__ == "__main__":
-    logger.remove()
-    logger.add(sys.stderr, level="INFO", format="{message}")
-    try:
-        make_gallery(RunFolder(RUNS_DIR / os.environ.get("RUN", "default")))
-    except SoftgripError as error:
-        logger.error("gallery: {}", error)
-        sys.exit(1)
+    run_command(gallery)

@@ -13,7 +13,7 @@ import typer
 from loguru import logger
 
 from pipeline.artifacts import publish_bytes
-from pipeline.errors import SoftgripError
+from pipeline.execution.commands import run_command
 from pipeline.execution.freshness import key_from_json
 from pipeline.execution.running import built_key, is_fresh, missing_shards, stage_context
 from pipeline.execution.stage import RunFolder, Stage
@@ -112,19 +112,8 @@ def _lost(folder: RunFolder, stage: str) -> bool:
     return MADE[stage].sharded and index.is_file() and bool(missing_shards(index))
 
 
-def main() -> None:
-    """Command line; failures end in one sentence."""
-    logger.remove()
-    logger.add(sys.stderr, level="INFO", format="{message}")
-    try:
-        app()
-    except SoftgripError as error:
-        logger.error("{}", error)
-        sys.exit(1)
-
-
 if __name__ == "__main__":
     os.environ.setdefault("MESH_DIR", "")
     if not os.environ["MESH_DIR"]:
         del os.environ["MESH_DIR"]
-    main()
+    run_command(app)

@@ -17,13 +17,16 @@ from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact
 from pipeline.artifacts.grasp_messages import (
     GraspOrigin,
     LabelledGrasps,
+    ShownPads,
     grasp_batch,
     grasps_of,
+    pads_message,
+    pads_of,
 )
 from pipeline.artifacts.object_messages import read_objects
-from pipeline.artifacts.scene_messages import read_scene, scene_count
+from pipeline.artifacts.scene_messages import read_placed, read_scene, scene_count
 from pipeline.artifacts.sharding import is_current, shard_entry, shard_path, write_index
-from pipeline.clutter.scene import ClutterScene
+from pipeline.clutter.scene import ClutterScene, PlacedObject
 from pipeline.config import RunConfig
 from pipeline.errors import SceneError
 from pipeline.execution import (
@@ -52,17 +55,18 @@ from pipeline.gripper.sampling import (
     propose,
     propose_nearby,
 )
+from pipeline.recording.cost import Stopwatch, recording_cost
 from pipeline.recording.grasps import ShownGrasp, blueprint, show_grasps
 from pipeline.recording.recording import recording, spread
 from pipeline.sensing.cameras import pixel_rays
 from pipeline.sensing.depth_noise import disturb
 from pipeline.sensing.sub_cloud import sub_clouds
 from pipeline.sensing.view import CameraView
-from schemas.softgrip.v1.grasps_pb2 import GraspBatch
+from schemas.softgrip.v1.grasps_pb2 import DrapedPads, GraspBatch
 from stages.graph import GRASPS, inputs_of
 
-TOPIC = "/grasps"
-RECORDED_SCENES = 4  # each costs its ray scene once more
+TOPIC, PADS_TOPIC = "/grasps", "/pads"
+RECORDED_SCENES = 4
 ROUND = 512  # grasps labelled at once: bounds the memory of their rays
 
 
@@ -72,6 +76,7 @@ class ShardJob:
 
     scene_index: int
     grasps: int
+    pads: int  # of its grasps, shown in the recording
     shard: Path
     objects: Path
     scenes: Path
@@ -88,6 +93,7 @@ class ShardResult:
     quality: Float[np.ndarray, " n"]
     object_names: tuple[str, ...]
     status: dict[str, int]
+    recording_s: float = 0.0  # processor time of draping the pads that are shown
 
 
 def build(stage: StageContext) -> Summary:
@@ -95,10 +101,13 @@ def build(stage: StageContext) -> Summary:
     scenes = stage.upstream("scenes")
     count = scene_count(scenes)
     share, more = divmod(stage.config.grasps.count, count)
+    recorded = spread(count, RECORDED_SCENES)
+    pads = max(1, stage.config.recording.grasps // len(recorded))
     jobs = [
         ShardJob(
             scene_index=index,
             grasps=share + (index < more),
+            pads=pads if index in recorded else 0,
             shard=shard_path(stage.shards, index, count),
             objects=stage.upstream("objects"),
             scenes=scenes,
@@ -110,7 +119,8 @@ def build(stage: StageContext) -> Summary:
     done = run_in_order(synthesize_shard, jobs, stage.workers, stage.executor)
     results = list(progress(done, count, "grasps", "scene"))
     quality = np.concatenate([result.quality for result in results])
-    record(stage, [result.shard for result in results], quality)
+    recording_cost.seconds += sum(result.recording_s for result in results)
+    record(stage, {index: results[index].shard for index in recorded}, quality)
     entries = [shard_entry(r.shard, stage.output.parent, len(r.quality), r.split) for r in results]
     write_index(stage.output, stage.provenance(), entries, quality_histogram(quality))
     return summary(results, quality)
@@ -118,11 +128,13 @@ def build(stage: StageContext) -> Summary:
 
 def synthesize_shard(job: ShardJob) -> ShardResult:
     """Make, or keep, the shard of one scene."""
+    draping = Stopwatch()
     if not is_current(job.shard, job.provenance.key):
         scene = read_scene(job.scenes, job.scene_index)
         meshes = {name: item.mesh for name, (item, _) in catalogue(job.objects).items()}
         rng = generator(job.config.seed, "grasps", scene.scene_id)
-        batches = synthesize(scene, meshes, job.config, job.grasps, rng)
+        surfaces = ray_scene(scene, meshes, job.config)
+        batches = synthesize(scene, surfaces, job.config, job.grasps, rng)
         size = job.config.grasps.samples_per_message
         with ArtifactWriter(job.shard, job.provenance) as artifact:
             written = 0
@@ -131,7 +143,28 @@ def synthesize_shard(job: ShardJob) -> ShardResult:
                     part = grasps.rows(start, min(start + size, len(grasps)))
                     artifact.write(TOPIC, grasp_batch(origin, part), log_time_ns=written)
                     written += len(part)
-    return examined(job.shard)
+            if job.pads:
+                with draping.running():
+                    pads = draped_pads([grasps for _, grasps in batches], surfaces[0], job)
+                    artifact.write(PADS_TOPIC, pads_message(pads), log_time_ns=written)
+    return replace(examined(job.shard), recording_s=draping.seconds)
+
+
+def draped_pads(batches: list[LabelledGrasps], rays: RayScene, job: ShardJob) -> ShownPads:
+    """Pads of some of a scene's grasps, from its worst label to its best, draped again."""
+    pad, gripper = pad_of(job.config), job.config.gripper
+    quality, frames, contact = (
+        np.concatenate([getattr(grasps, name) for grasps in batches])
+        for name in ("quality", "world_from_gripper", "contact_mask")
+    )
+    chosen = np.argsort(quality, kind="stable")[spread(len(quality), job.pads)]
+    heights, _ = pad_heights(frames[chosen], rays, pad, job.config.grasps.clearance_m)
+    draped = drape(pad, heights)
+    pressure = [
+        triangle_pressure(pad, gripper, z, touching)
+        for z, touching in zip(draped, contact[chosen], strict=True)
+    ]
+    return ShownPads(chosen, draped, np.array(pressure))
 
 
 @lru_cache(maxsize=1)
@@ -148,18 +181,19 @@ def pad_of(config: RunConfig) -> Pad:
 
 def synthesize(
     scene: ClutterScene,
-    meshes: dict[str, Mesh],
+    surfaces: tuple[RayScene, Int[np.ndarray, " bodies"]],
     config: RunConfig,
     wanted: int,
     rng: np.random.Generator,
 ) -> list[tuple[GraspOrigin, LabelledGrasps]]:
     """Algorithm 1 on every object of a scene, from each of its viewpoints.
 
-    S-1.01, the object's pose in SE(3), is where physics left it.
+    surfaces : of the scene, by `ray_scene`. S-1.01, the object's pose in SE(3), is where physics
+    left it.
     """
     placed = scene.objects
     names = tuple(sorted({item.object_name for item in placed}))
-    rays, body_ids = ray_scene(scene, meshes, config)
+    rays, body_ids = surfaces
     index_of_body = {item.body_id: names.index(item.object_name) for item in placed}
     batches = []
     for number, view in enumerate(scene.views):
@@ -323,42 +357,26 @@ def examined(shard: Path) -> ShardResult:
     return ShardResult(shard, split, np.concatenate(quality), tuple(sorted(names)), dict(status))
 
 
-def record(stage: StageContext, shards: list[Path], quality: np.ndarray) -> None:
-    """The recording: grasps of some scenes, spread over their labels."""
-    chosen = spread(len(shards), RECORDED_SCENES)
-    each = max(1, stage.config.recording.grasps // len(chosen))
+def record(stage: StageContext, shards: dict[int, Path], quality: np.ndarray) -> None:
+    """The recording: grasps of some scenes by their index, spread over their labels."""
     meshes = {n: item.mesh for n, (item, _) in catalogue(stage.upstream("objects")).items()}
     with recording(stage.recording, stage.stage.name, stage.key.digest, blueprint()) as stream:
         shown: list[ShownGrasp] = []
-        for index in chosen:
-            scene = read_scene(stage.upstream("scenes"), index)
-            shown += shown_grasps(scene, shards[index], meshes, stage.config, each)
+        for index, shard in shards.items():
+            placed = read_placed(stage.upstream("scenes"), index)
+            shown += shown_grasps(placed, shard)
         show_grasps(stream, shown, meshes, pad_of(stage.config), quality)
 
 
-def shown_grasps(
-    scene: ClutterScene, shard: Path, meshes: dict[str, Mesh], config: RunConfig, wanted: int
-) -> list[ShownGrasp]:
-    """Some grasps of a scene, from its worst to its best label, with their pads draped again."""
+def shown_grasps(placed: tuple[PlacedObject, ...], shard: Path) -> list[ShownGrasp]:
+    """The grasps of a shard that have their pads in it."""
     with open_artifact(shard) as artifact:
         batches = [grasps_of(message) for _, message in artifact.messages(GraspBatch)]
+        pads = pads_of(artifact.one(DrapedPads))
     rows = [(origin, batch, row) for origin, batch in batches for row in range(len(batch))]
-    rows.sort(key=lambda found: found[1].quality[found[2]])
-    chosen = [rows[i] for i in spread(len(rows), wanted)]
-    rays, _ = ray_scene(scene, meshes, config)
-    frames = np.array([grasps.world_from_gripper[row] for _, grasps, row in chosen])
-    heights, _ = pad_heights(frames, rays, pad_of(config), config.grasps.clearance_m)
-    pad = pad_of(config)
     return [
-        ShownGrasp(
-            scene,
-            origin,
-            grasps,
-            row,
-            draped,
-            triangle_pressure(pad, config.gripper, draped, grasps.contact_mask[row]),
-        )
-        for (origin, grasps, row), draped in zip(chosen, drape(pad, heights), strict=True)
+        ShownGrasp(placed, *rows[number], height, pressure)
+        for number, height, pressure in zip(pads.grasp, pads.height_m, pads.pressure, strict=True)
     ]
 
 

@@ -11,14 +11,13 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from loguru import logger
 
 from pipeline.artifacts import publish_bytes, read_provenance
 from pipeline.artifacts.object_messages import read_objects
 from pipeline.artifacts.scene_messages import read_scenes
 from pipeline.config import load_run_config
-from pipeline.errors import ArtifactError, SoftgripError
-from pipeline.execution import RunFolder, generator
+from pipeline.errors import ArtifactError
+from pipeline.execution import RunFolder, generator, run_command
 from pipeline.gripper.heights import pad_heights
 from pipeline.regression.comparison import Figures, compared_count, differences
 from pipeline.regression.figures import figures_of
@@ -94,10 +93,4 @@ def draw_pads(folder: RunFolder, path: Path) -> None:
 
 
 if __name__ == "__main__":
-    logger.remove()
-    logger.add(sys.stderr, level="INFO", format="{message}")
-    try:
-        typer.run(main)
-    except SoftgripError as error:
-        logger.error("{}", error)
-        sys.exit(EXIT_DIFFERENT)
+    run_command(main)

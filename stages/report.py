@@ -1,7 +1,6 @@
 """`make report`: a run on one page, from its artifacts and summaries alone."""
 
 import os
-import sys
 from collections import Counter
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,8 +11,8 @@ from loguru import logger
 from pipeline.artifacts import Provenance, open_artifact, package_version, publish_bytes
 from pipeline.artifacts.object_messages import read_objects
 from pipeline.config import RunConfig, load_run_config
-from pipeline.errors import ArtifactError, SoftgripError
-from pipeline.execution import RunFolder
+from pipeline.errors import ArtifactError
+from pipeline.execution import RunFolder, run_command
 from pipeline.execution.freshness import content_digests
 from pipeline.reporting import plots
 from pipeline.reporting.facts import (
@@ -249,13 +248,5 @@ def report(
 
 
 if __name__ == "__main__":
-    logger.remove()
-    logger.add(sys.stderr, level="INFO", format="{message}")
     os.environ.setdefault("MPLBACKEND", "svg")
-    app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-    app.command()(report)
-    try:
-        app()
-    except SoftgripError as error:
-        logger.error("report: {}", error)
-        sys.exit(1)
+    run_command(report)

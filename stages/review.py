@@ -10,8 +10,8 @@ from typing import Annotated
 import typer
 from loguru import logger
 
-from pipeline.errors import ArtifactError, SoftgripError
-from pipeline.execution import RunFolder
+from pipeline.errors import ArtifactError
+from pipeline.execution import RunFolder, run_command
 from stages.graph import MADE, RUNS_DIR
 
 WEB_PORT = 9090
@@ -71,12 +71,4 @@ def review(
 
 
 if __name__ == "__main__":
-    logger.remove()
-    logger.add(sys.stderr, level="INFO", format="{message}")
-    app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-    app.command()(review)
-    try:
-        app()
-    except SoftgripError as error:
-        logger.error("review: {}", error)
-        sys.exit(1)
+    run_command(review)

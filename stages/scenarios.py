@@ -10,13 +10,16 @@ import sys
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from pipeline.artifacts import publish_bytes
 from pipeline.config import RunConfig, load_run_config
 from pipeline.config.evaluation import PolicyName
 from pipeline.control.policy import Cause
 from pipeline.control.success import success_rate
-from pipeline.execution import RunFolder, generator, progress, run_in_order
+from pipeline.execution import RunFolder, generator, progress, run_command, run_in_order
 from pipeline.simulation.picking import Clutter, strategy_of
 from pipeline.simulation.scenarios import SCENARIOS, trials
 from stages.evaluate import SCORE_BATCH, network
@@ -47,11 +50,13 @@ class Row:
     failures: dict[str, int]
 
 
-def main() -> int:
+def scenarios(
+    run: Annotated[str, typer.Option(envvar="RUN", help="name of the run")] = "default",
+    workers: Annotated[int, typer.Option(envvar="WORKERS", min=1)] = len(os.sched_getaffinity(0)),
+) -> None:
     """Every scenario under every policy of the run."""
-    folder = RunFolder(RUNS_DIR / os.environ.get("RUN", "default"))
+    folder = RunFolder(RUNS_DIR / run)
     config = load_run_config(folder.config)
-    workers = int(os.environ.get("WORKERS") or len(os.sched_getaffinity(0)))
     jobs = [
         ScenarioJob(index, policy, folder.artifact("train"), config, TRIALS)
         for index in range(len(SCENARIOS))
@@ -64,7 +69,6 @@ def main() -> int:
     figures = [row.__dict__ for row in rows]
     publish_bytes(folder.path / "scenarios.json", (json.dumps(figures, indent=1) + "\n").encode())
     sys.stdout.write(text)
-    return 0
 
 
 def tried(job: ScenarioJob) -> Row:
@@ -104,4 +108,4 @@ def table(rows: list[Row]) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    run_command(scenarios)

@@ -1,4 +1,4 @@
-"""Labelled grasps ↔ softgrip.v1.GraspBatch."""
+"""Labelled grasps ↔ softgrip.v1.GraspBatch, pads to look at ↔ softgrip.v1.DrapedPads."""
 
 from dataclasses import dataclass, fields
 
@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from pipeline.artifacts.tensors import tensors_of, to_tensor
 from pipeline.errors import ContentError
-from schemas.softgrip.v1.grasps_pb2 import GraspBatch
+from schemas.softgrip.v1.grasps_pb2 import DrapedPads, GraspBatch
 
 # What each array is stored as; the field names are those of the message.
 STORED_AS = {
@@ -39,6 +39,10 @@ SHAPES = {
     "cloud": "n g g 3",
     "cloud_mask": "n g g",
 }
+
+
+PADS_STORED_AS = {"grasp": "u4", "height_m": "f4", "pressure": "f4"}
+PADS_SHAPES = {"grasp": "k", "height_m": "k v", "pressure": "k t"}
 
 
 @dataclass(frozen=True)
@@ -143,3 +147,30 @@ def grasps_of(message: GraspBatch) -> tuple[GraspOrigin, LabelledGrasps]:
         proposal_names=tuple(message.proposal_names),
     )
     return origin, LabelledGrasps(**arrays)
+
+
+@dataclass(frozen=True)
+class ShownPads:
+    """Pads of some grasps of a shard, draped.
+
+    grasp : number of each grasp within its shard.
+    height_m : z(v) of S-1.07, in GCS.
+    pressure : p w_j of each triangle, 0 where it is not in contact.
+    """
+
+    grasp: Int[np.ndarray, " k"]
+    height_m: Float[np.ndarray, "k v"]
+    pressure: Float[np.ndarray, "k t"]
+
+
+def pads_message(pads: ShownPads) -> DrapedPads:
+    """The message of some pads."""
+    message = DrapedPads()
+    for name, dtype in PADS_STORED_AS.items():
+        getattr(message, name).CopyFrom(to_tensor(getattr(pads, name).astype(dtype)))
+    return message
+
+
+def pads_of(message: DrapedPads) -> ShownPads:
+    """The pads of a message. Raises ContentError where its tensors do not fit together."""
+    return ShownPads(**tensors_of(message, PADS_STORED_AS, PADS_SHAPES))

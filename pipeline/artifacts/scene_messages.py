@@ -109,6 +109,14 @@ def read_scene(path: Path, index: int) -> ClutterScene:
     raise ArtifactError(f"{path} holds no scene {index}", "Make the scenes again")
 
 
+def read_placed(path: Path, index: int) -> tuple[PlacedObject, ...]:
+    """The objects of scene ``index`` where they lie, no image read."""
+    with open_artifact(path) as artifact:
+        for _, message in artifact.messages(scenes_pb2.Scene, at_ns=index * NS_PER_SCENE):
+            return _placed(message)
+    raise ArtifactError(f"{path} holds no scene {index}", "Make the scenes again")
+
+
 def read_scenes(path: Path) -> Iterator[ClutterScene]:
     """All scenes, in order, one in memory at a time."""
     for index in range(scene_count(path)):
@@ -122,14 +130,18 @@ def _scene(artifact: Artifact, message: scenes_pb2.Scene, time_ns: int) -> Clutt
         level=message.level,
         split=message.split,
         seed=message.seed,
-        objects=tuple(
-            PlacedObject(p.object_name, p.body_id, from_tensor(p.world_from_object))
-            for p in message.objects
-        ),
+        objects=_placed(message),
         gaps_m=np.array([placed.gap_m for placed in message.objects]),
         contacts=tuple((int(a), int(b)) for a, b in contacts),
         settle_time_s=message.settle_time_s,
         views=tuple(_view(artifact, viewpoint, time_ns) for viewpoint in message.viewpoints),
+    )
+
+
+def _placed(message: scenes_pb2.Scene) -> tuple[PlacedObject, ...]:
+    return tuple(
+        PlacedObject(p.object_name, p.body_id, from_tensor(p.world_from_object))
+        for p in message.objects
     )
 
 

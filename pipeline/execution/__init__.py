@@ -1,5 +1,6 @@
 """Work items → results, in order: stages, seeds, progress, freshness, resume."""
 
+from pipeline.execution.commands import run_command
 from pipeline.execution.executors import run_in_order
 from pipeline.execution.progress import progress
 from pipeline.execution.running import Summary, stage_command
@@ -14,6 +15,7 @@ __all__ = [
     "derive_seed",
     "generator",
     "progress",
+    "run_command",
     "run_in_order",
     "stage_command",
 ]

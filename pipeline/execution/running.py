@@ -20,6 +20,7 @@ from pipeline.artifacts import open_artifact, publish_bytes, read_provenance
 from pipeline.artifacts.publishing import CANNOT_WRITE, write_error
 from pipeline.config import load_run_config
 from pipeline.errors import ArtifactError, ConfigError, SoftgripError
+from pipeline.execution.commands import EXIT_FAILURE, words_to
 from pipeline.execution.executors import Executor
 from pipeline.execution.freshness import Key, key_from_json, stage_key
 from pipeline.execution.stage import RunFolder, Stage, StageContext
@@ -32,7 +33,6 @@ InputsOf = Callable[[Stage, RunFolder, Path | None], dict[str, Path]]
 
 CLOCK_TICK_S = 0.01  # what processor time is counted in
 
-EXIT_FAILURE = 1
 EXIT_INTERRUPTED = 130
 MEMO = "hashes.json"
 
@@ -191,8 +191,7 @@ def _exclusive(folder: RunFolder, stage: Stage) -> Iterator[None]:
 @contextmanager
 def _readable_failures(stage: Stage, folder: RunFolder, rank: int) -> Iterator[None]:
     """Every failure ends in one sentence and a non-zero exit; the trace goes to the log."""
-    logger.remove()
-    logger.add(sys.stderr, level="ERROR" if rank else "INFO", format="{message}")
+    words_to(sys.stderr, "ERROR" if rank else "INFO")
     signal.signal(signal.SIGTERM, _as_interrupt)
     log = folder.log(f"{stage.name}.rank{rank}" if rank else stage.name)
     try:

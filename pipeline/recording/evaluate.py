@@ -84,15 +84,11 @@ def show_attempts(
             stream.log(f"{objects}/{index + 1:02d}", shown_mesh(meshes[name], colour))
         stream.log("notes/attempt", rr.TextDocument(_facts(made), media_type=rr.MediaType.MARKDOWN))
         _show_choice(stream, made)
-        path, bodies = from_tensor(made.gripper_path), from_tensor(made.object_paths)
-        wrench = from_tensor(made.base_wrench)
+        path = from_tensor(made.gripper_path)
         if len(path):
             stream.log("world/path", rr.LineStrips3D([path[:, :3, 3]], radii=0.001))
-        for index in range(len(path)):
-            step(stream, TIMELINE, frame)
-            frame += 1
-            stream.log("curves/state", rr.Scalars(STATES.index(made.states[index])))
-            _show_frame(stream, objects, path[index], bodies[index], wrench[index])
+            _show_motion(stream, objects, made, frame)
+        frame += len(path)
 
 
 def worst_first(attempts: Sequence[Attempt]) -> list[Attempt]:
@@ -162,24 +158,39 @@ def _show_picture(stream: rr.RecordingStream, path: str, picture: DepthPicture) 
     stream.log(path, rr.DepthImage(depth, meter=1000.0, depth_range=reach, colormap="viridis"))
 
 
-def _show_frame(
-    stream: rr.RecordingStream,
-    objects: str,
-    pose: np.ndarray,
-    bodies: np.ndarray,
-    wrench: np.ndarray,
+def _show_motion(stream: rr.RecordingStream, objects: str, made: Attempt, first: int) -> None:
+    """Every frame of an attempt, from frame ``first``: poses, wrench and the policy's state."""
+    path, bodies = from_tensor(made.gripper_path), from_tensor(made.object_paths)
+    frames = first + np.arange(len(path))
+    there = np.isfinite(bodies).all(axis=(2, 3))
+    for index in range(bodies.shape[1]):
+        body = f"{objects}/{index + 1:02d}"
+        gone = np.flatnonzero(~there[:, index])
+        until = int(gone[0]) if gone.size else len(path)
+        _send_poses(stream, body, frames[:until], bodies[:until, index])
+        if gone.size:
+            step(stream, TIMELINE, int(frames[until]))
+            stream.log(body, rr.Clear(recursive=True))
+    _send_poses(stream, "world/gripper", frames, path)
+    wrench = from_tensor(made.base_wrench)
+    curves = [f"{quantity}/{axis}" for quantity in ("force", "moment") for axis in "xyz"]
+    states = [STATES.index(state) for state in made.states]
+    for curve, values in [*zip(curves, wrench.T, strict=True), ("state", states)]:
+        stream.send_columns(
+            f"curves/{curve}",
+            indexes=[rr.TimeColumn(TIMELINE, sequence=frames)],
+            columns=rr.Scalars.columns(scalars=values),
+        )
+
+
+def _send_poses(
+    stream: rr.RecordingStream, entity: str, frames: np.ndarray, poses: np.ndarray
 ) -> None:
-    for index, body in enumerate(bodies):
-        path = f"{objects}/{index + 1:02d}"
-        if np.isfinite(body).all():
-            stream.log(path, shown_pose(body))
-        else:
-            stream.log(path, rr.Clear(recursive=True))
-    stream.log("world/gripper", shown_pose(pose))
-    for name, value in zip(("x", "y", "z"), wrench[:3], strict=True):
-        stream.log(f"curves/force/{name}", rr.Scalars(value))
-    for name, value in zip(("x", "y", "z"), wrench[3:], strict=True):
-        stream.log(f"curves/moment/{name}", rr.Scalars(value))
+    """A frame's pose at each of some frames of the film."""
+    if len(frames):
+        columns = rr.Transform3D.columns(translation=poses[:, :3, 3], mat3x3=poses[:, :3, :3])
+        indexes = [rr.TimeColumn(TIMELINE, sequence=frames)]
+        stream.send_columns(entity, indexes=indexes, columns=columns)
 
 
 def _facts(made: Attempt) -> str:

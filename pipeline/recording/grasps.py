@@ -13,7 +13,7 @@ import rerun.blueprint as rrb
 from jaxtyping import Float
 
 from pipeline.artifacts.grasp_messages import GraspOrigin, LabelledGrasps
-from pipeline.clutter.scene import ClutterScene
+from pipeline.clutter.scene import PlacedObject
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.transforms import invert
 from pipeline.gripper.balancing import quality_histogram
@@ -26,21 +26,25 @@ TIMELINE = "grasp"
 FULL_PRESSURE = 1.1  # p w_j of a full seal where w_j is greatest, with sigma_W of Eq. (13)
 VIEW = f"Pad by p w_j (dark 0, yellow {FULL_PRESSURE}; red: lifted), wrench, cloud; in GCS"
 LIFTED = colours.PALETTE[5]
-LIFT_M = 3e-4  # the pad is drawn this much above what it lies on
+LIFT_M = 3e-4  # the pad is drawn so far above what it lies on, as that is drawn simplified
 ARROW_M = 0.04  # a full seal's force is drawn this long
+ARROW_Z = (235, 235, 235)
 LOADS = ("F_x", "F_y", "F_z", "T_z")
 NEAR_M = 0.12  # other objects are drawn when this near
+
+Steps = Sequence[rr.TimeColumn]
 
 
 @dataclass(frozen=True)
 class ShownGrasp:
     """One grasp of the recording.
 
+    placed : the objects of its scene.
     pad_height_m : draped pad, z in GCS at first touch.
     pad_pressure : p w_j of each triangle, as in `triangle_pressure`.
     """
 
-    scene: ClutterScene
+    placed: Sequence[PlacedObject]
     origin: GraspOrigin
     grasps: LabelledGrasps
     row: int
@@ -85,100 +89,141 @@ def show_grasps(
     name_curve(stream, "curves/label/q", "q", colours.PALETTE[2])
     name_curve(stream, "curves/label/p", "p", colours.PALETTE[1])
     ordered = sorted(grasps, key=lambda shown: -shown.grasps.quality[shown.row])
+    names = {placed.object_name for shown in ordered for placed in shown.placed}
+    corners = {name: meshes[name].vertices_m for name in names}
+    boxes = {name: np.array([v.min(axis=0), v.max(axis=0)]) for name, v in corners.items()}
     for number, shown in enumerate(ordered):
         step(stream, TIMELINE, number)
         objects = numbered(stream, "world/objects", number)
-        _show_surroundings(stream, objects, shown.scene, shown.grasps, shown.row, meshes)
-        _show_pad(stream, shown, pad)
-        _show_figures(stream, shown.origin, shown.grasps, shown.row)
+        _show_surroundings(stream, objects, shown, meshes, boxes)
+        stream.log("curves/limits", rr.BarChart(_limits_used(shown)))
+    steps = [rr.TimeColumn(TIMELINE, sequence=np.arange(len(ordered)))]
+    _show_pads(stream, steps, ordered, pad)
+    _show_clouds(stream, steps, ordered, pad)
+    _show_wrenches(stream, steps, ordered)
+    for name, values in (
+        ("q", [shown.grasps.quality[shown.row] for shown in ordered]),
+        ("p", [shown.grasps.pressure[shown.row] for shown in ordered]),
+    ):
+        columns = rr.Scalars.columns(scalars=values)
+        stream.send_columns(f"curves/label/{name}", indexes=steps, columns=columns)
+    facts = rr.TextDocument.columns(
+        text=[_facts(shown) for shown in ordered],
+        media_type=[rr.MediaType.MARKDOWN] * len(ordered),
+    )
+    stream.send_columns("notes/grasp", indexes=steps, columns=facts)
 
 
 def _show_surroundings(
     stream: rr.RecordingStream,
     path: str,
-    scene: ClutterScene,
-    grasps: LabelledGrasps,
-    row: int,
+    shown: ShownGrasp,
     meshes: Mapping[str, Mesh],
+    boxes: Mapping[str, Float[np.ndarray, "2 3"]],
 ) -> None:
     """The target and its near neighbours, in GCS."""
+    grasps, row = shown.grasps, shown.row
     gripper_from_world = invert(grasps.world_from_gripper[row])
-    for placed in scene.objects:
+    for placed in shown.placed:
         mesh = meshes[placed.object_name]
         gripper_from_object = gripper_from_world @ placed.world_from_object
         target = placed.body_id == grasps.body_id[row]
-        # The frame's origin is the pad's centre.
-        pad_centre = invert(gripper_from_object)[:3, 3]
-        if not target and np.linalg.norm(mesh.vertices_m - pad_centre, axis=1).min() > NEAR_M:
+        if not target and _distance_m(boxes[placed.object_name], gripper_from_object) > NEAR_M:
             continue
         colour = colours.PALETTE[1] if target else colours.PALETTE[7]
         body = f"{path}/{placed.body_id:02d}"
-        # Mesh and pose apart: the mesh is simplified once, however often it is shown.
+        # Mesh and pose apart: the mesh is made ready once, however often it is shown.
         stream.log(body, shown_mesh(mesh, colour))
         stream.log(body, shown_pose(gripper_from_object))
 
 
-def _show_pad(stream: rr.RecordingStream, shown: ShownGrasp, pad: Pad) -> None:
-    """The draped pad by p w_j, the rest of it lifted; the cloud; the wrench."""
-    grasps, row = shown.grasps, shown.row
-    vertices = np.column_stack([pad.vertices_xy_m, shown.pad_height_m + LIFT_M])
-    sealing = grasps.contact_mask[row][pad.triangles].all(axis=1)
-    pressure = colours.by_value(shown.pad_pressure / FULL_PRESSURE)
-    colour = np.where(sealing[:, None], pressure, LIFTED).astype(np.uint8)
-    # A triangle in a colour of its own shares no vertex.
-    stream.log(
-        "world/pad",
-        rr.Mesh3D(
-            vertex_positions=vertices[pad.triangles].reshape(-1, 3),
-            vertex_colors=np.repeat(colour, 3, axis=0),
-        ),
-    )
-    seen = grasps.cloud_mask[row]
-    points = grasps.cloud[row][seen].astype(np.float64) * pad.radius_m
-    points[:, 2] -= grasps.touch_height_m[row]
-    stream.log("world/cloud", rr.Points3D(points, radii=5e-4, colors=colours.PALETTE[3]))
-    f_x, f_y, f_z, _ = grasps.wrench[row]
-    # The vacuum pulls the object up, out along +z.
-    stream.log(
-        "world/wrench",
-        rr.Arrows3D(
-            origins=[[0, 0, 0.01]] * 2,
-            vectors=ARROW_M * np.array([[0, 0, f_z], [f_x, f_y, 0]]),
-            colors=[colours.PALETTE[4], colours.PALETTE[6]],
-            labels=["F_z", "F_xy"],
-            radii=6e-4,
-        ),
-    )
+def _distance_m(
+    box_m: Float[np.ndarray, "2 3"], gripper_from_object: Float[np.ndarray, "4 4"]
+) -> float:
+    """From the pad's centre, which is the frame's origin, to an object's box in its own frame."""
+    centre = invert(gripper_from_object)[:3, 3]
+    return float(np.linalg.norm(centre - np.clip(centre, *box_m)))
 
 
-def _show_figures(
-    stream: rr.RecordingStream, origin: GraspOrigin, grasps: LabelledGrasps, row: int
+def _show_pads(
+    stream: rr.RecordingStream, steps: Steps, ordered: Sequence[ShownGrasp], pad: Pad
 ) -> None:
-    """q, p, GW and how much of each limit is used."""
-    quality, pressure = float(grasps.quality[row]), float(grasps.pressure[row])
-    stream.log("curves/label/q", rr.Scalars(quality))
-    stream.log("curves/label/p", rr.Scalars(pressure))
-    slack = grasps.limit_slack[row]
+    """The draped pads by p w_j, the rest of them lifted."""
+    height = np.array([shown.pad_height_m for shown in ordered]) + LIFT_M
+    flat = np.broadcast_to(pad.vertices_xy_m, (*height.shape, 2))
+    vertices = np.concatenate([flat, height[..., None]], axis=2).astype(np.float32)
+    contact = np.array([shown.grasps.contact_mask[shown.row] for shown in ordered])
+    pressure = np.array([shown.pad_pressure for shown in ordered])
+    by_pressure = colours.by_value(pressure.ravel() / FULL_PRESSURE)
+    sealing = contact[:, pad.triangles].all(axis=2).ravel()
+    colour = np.where(sealing[:, None], by_pressure, LIFTED).astype(np.uint8)
+    # A triangle in a colour of its own shares no vertex.
+    columns = rr.Mesh3D.columns(
+        vertex_positions=vertices[:, pad.triangles].reshape(-1, 3),
+        vertex_colors=np.repeat(colour, 3, axis=0),
+    )
+    corners = [pad.triangles.size] * len(ordered)
+    stream.send_columns("world/pad", indexes=steps, columns=columns.partition(corners))
+
+
+def _show_clouds(
+    stream: rr.RecordingStream, steps: Steps, ordered: Sequence[ShownGrasp], pad: Pad
+) -> None:
+    """What the camera measured around the contact."""
+    clouds = []
+    for shown in ordered:
+        grasps, row = shown.grasps, shown.row
+        points = grasps.cloud[row][grasps.cloud_mask[row]].astype(np.float32) * pad.radius_m
+        points[:, 2] -= grasps.touch_height_m[row]
+        clouds.append(points)
+    columns = rr.Points3D.columns(positions=np.concatenate(clouds))
+    counts = [len(points) for points in clouds]
+    stream.send_columns("world/cloud", indexes=steps, columns=columns.partition(counts))
+    look = rr.Points3D.from_fields(radii=5e-4, colors=colours.PALETTE[3])
+    stream.log("world/cloud", look, static=True)
+
+
+def _show_wrenches(stream: rr.RecordingStream, steps: Steps, ordered: Sequence[ShownGrasp]) -> None:
+    """GW as two arrows; the vacuum pulls the object up, out along +z."""
+    wrench = np.array([shown.grasps.wrench[shown.row] for shown in ordered])
+    along_z, sideways = wrench[:, :3] * [0, 0, 1], wrench[:, :3] * [1, 1, 0]
+    vectors = ARROW_M * np.stack([along_z, sideways], axis=1)
+    columns = rr.Arrows3D.columns(vectors=vectors.reshape(-1, 3))
+    stream.send_columns(
+        "world/wrench", indexes=steps, columns=columns.partition([2] * len(ordered))
+    )
+    look = rr.Arrows3D.from_fields(
+        origins=[[0, 0, 0.01]] * 2,
+        colors=[ARROW_Z, colours.PALETTE[6]],
+        labels=["F_z", "F_xy"],
+        radii=6e-4,
+    )
+    stream.log("world/wrench", look, static=True)
+
+
+def _limits_used(shown: ShownGrasp) -> Float[np.ndarray, " 4"]:
+    """How much of each limit of Eq. (8)-(11) is used: 0 in its middle, 1 at a bound."""
+    slack = shown.grasps.limit_slack[shown.row]
     upper, lower = slack[:4], slack[4:]
     width = np.maximum(upper + lower, 1e-12)
-    used = 1.0 - 2.0 * np.minimum(upper, lower) / width
-    stream.log("curves/limits", rr.BarChart(used))
+    return np.asarray(1.0 - 2.0 * np.minimum(upper, lower) / width)
+
+
+def _facts(shown: ShownGrasp) -> str:
+    """q, p, GW and where the grasp comes from."""
+    origin, grasps, row = shown.origin, shown.grasps, shown.row
     loads = "".join(
         f"| {name} of GW, share of its limit | {value:+.3f}, {100 * share:.0f} % |\n"
-        for name, value, share in zip(LOADS, grasps.wrench[row], used, strict=True)
+        for name, value, share in zip(LOADS, grasps.wrench[row], _limits_used(shown), strict=True)
     )
-    stream.log(
-        "notes/grasp",
-        rr.TextDocument(
-            f"**q = {quality:.3f}**, p = {pressure:.3f}, "
-            f"{origin.status_names[int(grasps.status[row])]} "
-            f"in {int(grasps.iterations[row])} iterations\n\n"
-            f"| | |\n|-|-|\n"
-            f"| object | {origin.object_names[int(grasps.object_index[row])]} |\n"
-            f"| scene | {origin.scene_id}, level {origin.level}, {origin.split} |\n"
-            f"{loads}"
-            f"| tilt off the normal | {np.degrees(float(grasps.tilt_rad[row])):.1f}° |\n"
-            f"| proposed as | {origin.proposal_names[int(grasps.proposal[row])]} |\n",
-            media_type=rr.MediaType.MARKDOWN,
-        ),
+    return (
+        f"**q = {float(grasps.quality[row]):.3f}**, p = {float(grasps.pressure[row]):.3f}, "
+        f"{origin.status_names[int(grasps.status[row])]} "
+        f"in {int(grasps.iterations[row])} iterations\n\n"
+        f"| | |\n|-|-|\n"
+        f"| object | {origin.object_names[int(grasps.object_index[row])]} |\n"
+        f"| scene | {origin.scene_id}, level {origin.level}, {origin.split} |\n"
+        f"{loads}"
+        f"| tilt off the normal | {np.degrees(float(grasps.tilt_rad[row])):.1f}° |\n"
+        f"| proposed as | {origin.proposal_names[int(grasps.proposal[row])]} |\n"
     )

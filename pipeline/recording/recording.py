@@ -20,9 +20,11 @@ import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
+from functools import partial
 from pathlib import Path
 
 import numpy as np
+import pyarrow.compute  # noqa: F401 - Rerun loads it at the first bar chart, amid the logging
 import rerun as rr
 import rerun.blueprint as rrb
 from jaxtyping import UInt8
@@ -54,16 +56,17 @@ def recording(
     amid_work : the block holds the stage's work too, and what it logs runs under
         `recording_cost` itself; else the whole block counts as recording.
     """
+    held = partial(recording_cost.running, whole_process=not amid_work)
     with published(path) as scratch:
-        with recording_cost.running():
+        with held():
             _check_room(scratch)
             stream = rr.RecordingStream(f"{APPLICATION}_{stage}", recording_id=recording_id)
             stream.save(scratch, default_blueprint=blueprint)
         try:
-            with nullcontext() if amid_work else recording_cost.running():
+            with nullcontext() if amid_work else held():
                 yield stream
         finally:
-            with recording_cost.running(), _disk_full_told(scratch):
+            with held(), _disk_full_told(scratch):
                 stream.flush()
                 stream.disconnect()
 

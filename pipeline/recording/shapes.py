@@ -2,28 +2,37 @@
 
 from functools import lru_cache
 
-import fast_simplification
 import numpy as np
 import rerun as rr
 import trimesh
 from jaxtyping import Float, UInt8
 
+from pipeline.geometry.manifolds import from_manifold, to_manifold
 from pipeline.geometry.mesh import Mesh
 
+TOLERANCE_M = 2e-4  # how far an edge that collapses may move: too little to be seen
 # A scan of 16 000 faces in each of many scenes would make a recording of hundreds of MB.
-SHOWN_FACES = 4000
-SIMPLIFIED_AT = 10.0  # longest extent while a mesh is simplified
+FEW_FACES, MOST_FACES = 1_000, 10_000
 CREASE_RAD = 0.6  # sharper edges stay edges when a mesh is shaded
 
 
 def shown_mesh(mesh: Mesh, colour: UInt8[np.ndarray, " 3"]) -> rr.Mesh3D:
-    """A mesh in one colour, smooth but for its edges, of at most about ``SHOWN_FACES`` faces."""
+    """A closed mesh in one colour, smooth but for its edges, about ``TOLERANCE_M`` off at most.
+
+    One that keeps more than ``MOST_FACES`` faces so is given more tolerance.
+    """
+    return _ready(mesh, (*colour.tolist(), 255))
+
+
+@lru_cache(maxsize=256)
+def _ready(mesh: Mesh, rgba: tuple[int, ...]) -> rr.Mesh3D:
+    """Made once, however often it is logged."""
     shown = _shaded(mesh)
     return rr.Mesh3D(
         vertex_positions=shown.vertices_m,
         triangle_indices=shown.faces,
         vertex_normals=vertex_normals(shown),
-        albedo_factor=[*colour.tolist(), 255],
+        albedo_factor=rgba,
     )
 
 
@@ -41,18 +50,20 @@ def shown_facets(mesh: Mesh, colour: UInt8[np.ndarray, " 3"]) -> rr.Mesh3D:
 
 @lru_cache(maxsize=256)
 def _shaded(mesh: Mesh) -> Mesh:
-    """Simplified where it must be, with the vertices of its edges doubled."""
-    vertices, faces = mesh.vertices_m, mesh.faces
-    if len(faces) > SHOWN_FACES:
-        # Its thresholds are lengths: at this size it keeps edges that it tears in metres.
-        size = SIMPLIFIED_AT / mesh.extents_m.max()
-        vertices, faces = fast_simplification.simplify(
-            (vertices * size).astype(np.float32), faces.astype(np.int32), target_count=SHOWN_FACES
-        )
-        vertices = vertices / size
-    surface = trimesh.Trimesh(vertices, faces, process=False)
+    """Simplified but where it is small, with the vertices of its edges doubled."""
+    shown = mesh if len(mesh.faces) <= FEW_FACES else _simplified(mesh)
+    surface = trimesh.Trimesh(shown.vertices_m, shown.faces, process=False)
     parted = trimesh.graph.smooth_shade(surface, angle=CREASE_RAD)
     return Mesh(np.array(parted.vertices, dtype=np.float64), np.array(parted.faces, dtype=np.int64))
+
+
+def _simplified(mesh: Mesh) -> Mesh:
+    solid, tolerance_m = to_manifold(mesh), TOLERANCE_M
+    simple = solid.simplify(tolerance_m)
+    while simple.num_tri() > MOST_FACES:
+        tolerance_m *= 2
+        simple = solid.simplify(tolerance_m)
+    return from_manifold(simple)
 
 
 @lru_cache(maxsize=256)

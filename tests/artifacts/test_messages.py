@@ -1,13 +1,21 @@
 """Grasps and samples survive their messages; shards are named, kept and checked."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from pipeline.artifacts import ArtifactWriter, Provenance
-from pipeline.artifacts.grasp_messages import GraspOrigin, LabelledGrasps, grasp_batch, grasps_of
+from pipeline.artifacts.grasp_messages import (
+    GraspOrigin,
+    LabelledGrasps,
+    ShownPads,
+    grasp_batch,
+    grasps_of,
+    pads_message,
+    pads_of,
+)
 from pipeline.artifacts.sample_messages import Samples, joined_samples, sample_batch, samples_of
 from pipeline.artifacts.sharding import (
     is_current,
@@ -18,7 +26,7 @@ from pipeline.artifacts.sharding import (
     write_index,
 )
 from pipeline.errors import ArtifactError
-from schemas.softgrip.v1.grasps_pb2 import GraspBatch, ShardEntry
+from schemas.softgrip.v1.grasps_pb2 import DrapedPads, GraspBatch, ShardEntry
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 
 
@@ -58,6 +66,17 @@ def test_grasps_round_trip(count: int) -> None:
         then, now = getattr(grasps, field.name), getattr(back, field.name)
         narrow = field.name in ("tilt_rad", "keep_probability")
         np.testing.assert_allclose(now, then, rtol=1e-6 if narrow else 0)
+
+
+def test_pads_round_trip_and_must_fit_together() -> None:
+    pads = ShownPads(np.array([4, 2]), np.full((2, 586), -1e-3), np.full((2, 1125), 0.5))
+    wire = pads_message(pads).SerializeToString()
+    back = pads_of(DrapedPads.FromString(wire))
+    for field in fields(pads):
+        now, then = getattr(back, field.name), getattr(pads, field.name)
+        np.testing.assert_allclose(now, then, rtol=1e-6)
+    with pytest.raises(ArtifactError, match="pressure"):
+        pads_of(pads_message(replace(pads, pressure=np.zeros((3, 1125)))))
 
 
 def test_samples_round_trip_and_join() -> None:

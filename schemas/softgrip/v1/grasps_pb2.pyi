@@ -63,6 +63,16 @@ class GraspBatch(_message.Message):
     touch_height_m: _tensor_pb2.Tensor
     def __init__(self, scene_id: _Optional[str] = ..., viewpoint: _Optional[str] = ..., level: _Optional[int] = ..., split: _Optional[str] = ..., object_names: _Optional[_Iterable[str]] = ..., object_index: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., body_id: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., world_from_gripper: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., quality: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., pressure: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., wrench: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., limit_slack: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., limit_names: _Optional[_Iterable[str]] = ..., weight_summary: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., contact_mask: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., pad_vertices: _Optional[int] = ..., status: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., status_names: _Optional[_Iterable[str]] = ..., iterations: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., tilt_rad: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., proposal: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., proposal_names: _Optional[_Iterable[str]] = ..., keep_probability: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., cloud: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., cloud_mask: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., touch_height_m: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ...) -> None: ...
 
+class DrapedPads(_message.Message):
+    __slots__ = ("grasp", "height_m", "pressure")
+    GRASP_FIELD_NUMBER: _ClassVar[int]
+    HEIGHT_M_FIELD_NUMBER: _ClassVar[int]
+    PRESSURE_FIELD_NUMBER: _ClassVar[int]
+    grasp: _tensor_pb2.Tensor
+    height_m: _tensor_pb2.Tensor
+    pressure: _tensor_pb2.Tensor
+    def __init__(self, grasp: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., height_m: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., pressure: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ...) -> None: ...
+
 class ShardEntry(_message.Message):
     __slots__ = ("path", "sha256", "samples", "split")
     PATH_FIELD_NUMBER: _ClassVar[int]
