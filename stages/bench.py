@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.artifacts import ArtifactWriter, publish_bytes
-from pipeline.artifacts.grasp_messages import grasp_batch
+from pipeline.artifacts.grasp_messages import GraspOrigin, LabelledGrasps, grasp_batch
 from pipeline.artifacts.object_messages import read_objects
 from pipeline.artifacts.sample_messages import Samples
 from pipeline.artifacts.scene_messages import read_scenes

@@ -374,10 +374,11 @@ def shown_grasps(placed: tuple[PlacedObject, ...], shard: Path) -> list[ShownGra
         batches = [grasps_of(message) for _, message in artifact.messages(GraspBatch)]
         pads = pads_of(artifact.one(DrapedPads))
     rows = [(origin, batch, row) for origin, batch in batches for row in range(len(batch))]
-    return [
-        ShownGrasp(placed, *rows[number], height, pressure)
-        for number, height, pressure in zip(pads.grasp, pads.height_m, pads.pressure, strict=True)
-    ]
+    shown = []
+    for number, height, pressure in zip(pads.grasp, pads.height_m, pads.pressure, strict=True):
+        origin, grasps, row = rows[number]
+        shown.append(ShownGrasp(placed, origin, grasps, row, height, pressure))
+    return shown
 
 
 def summary(results: list[ShardResult], quality: np.ndarray) -> Summary:

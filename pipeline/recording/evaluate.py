@@ -46,8 +46,8 @@ def blueprint() -> rrb.Blueprint:
                 rrb.TimeSeriesView(origin="/curves/force", name="force at the base in N"),
                 rrb.TimeSeriesView(origin="/curves/moment", name="moment at the base in N m"),
                 rrb.Tabs(
-                    rrb.TimeSeriesView(origin="/curves/state", name="State of the policy"),
                     rrb.TextDocumentView(origin="/notes/result", name="Success"),
+                    rrb.TimeSeriesView(origin="/curves/state", name="State of the policy"),
                 ),
                 row_shares=[2, 3, 2, 2, 2],
             ),
