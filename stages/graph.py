@@ -17,7 +17,7 @@ from pipeline.execution.commands import run_command
 from pipeline.execution.freshness import key_from_json
 from pipeline.execution.running import built_key, is_fresh, missing_shards, stage_context
 from pipeline.execution.stage import RunFolder, Stage
-from pipeline.geometry.mesh_files import list_mesh_files
+from pipeline.geometry.mesh_folders import list_mesh_files
 
 OBJECTS = Stage("objects", ("seed", "objects", "split", "recording.objects"))
 SCENES = Stage("scenes", ("seed", "scenes", "cameras", "recording.scenes"), ("objects",))

@@ -26,7 +26,7 @@ from pipeline.geometry.catalogue import (
     finish_object,
     measure_object,
 )
-from pipeline.geometry.mesh_files import object_names
+from pipeline.geometry.mesh_folders import object_names
 from pipeline.geometry.parametric import PARAMETRIC_OBJECTS, parametric_source
 from pipeline.geometry.selection import choose_split, choose_subset
 from pipeline.geometry.urdf_files import load_object_file, standalone

@@ -17,13 +17,13 @@ from pipeline.config.objects import ObjectsConfig
 from pipeline.errors import MeshError
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.mesh_files import (
-    MESH_SUFFIXES,
     MeshSource,
     check_arrays,
     length_unit,
     load_mesh_file,
     read_raw_mesh,
 )
+from pipeline.geometry.mesh_folders import MESH_SUFFIXES
 from pipeline.geometry.mesh_headers import check_faces_allowed
 
 URDF_SUFFIX = ".urdf"

@@ -26,7 +26,8 @@ from pipeline.artifacts.sample_messages import Samples, sample_batch, samples_of
 from pipeline.artifacts.training_messages import CHECKPOINT, EXPORT
 from pipeline.config import ObjectsConfig, load_run_config
 from pipeline.errors import SoftgripError
-from pipeline.geometry.mesh_files import MESH_SUFFIXES, load_mesh_file
+from pipeline.geometry.mesh_files import load_mesh_file
+from pipeline.geometry.mesh_folders import MESH_SUFFIXES
 from pipeline.network.checkpoint import _digest, load_checkpoint_bytes
 from pipeline.network.export import OnnxPredictor
 from schemas.softgrip.v1.grasps_pb2 import GraspBatch, ShardIndex

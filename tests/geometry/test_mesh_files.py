@@ -9,7 +9,8 @@ import trimesh
 
 from pipeline.config import ObjectsConfig
 from pipeline.errors import MeshError
-from pipeline.geometry.mesh_files import list_mesh_files, load_mesh_file, object_names
+from pipeline.geometry.mesh_files import load_mesh_file
+from pipeline.geometry.mesh_folders import list_mesh_files, object_names
 
 CONFIG = ObjectsConfig()
 BOX = trimesh.creation.box(extents=(0.1, 0.05, 0.02))

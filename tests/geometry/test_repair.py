@@ -10,7 +10,8 @@ import trimesh
 from pipeline.config import ObjectsConfig
 from pipeline.errors import MeshError
 from pipeline.geometry.mesh import Mesh
-from pipeline.geometry.mesh_files import list_mesh_files, load_mesh_file
+from pipeline.geometry.mesh_files import load_mesh_file
+from pipeline.geometry.mesh_folders import list_mesh_files
 from pipeline.geometry.repair import repair
 from pipeline.geometry.shape import volume
 from pipeline.geometry.topology import is_closed

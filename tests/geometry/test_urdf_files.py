@@ -9,7 +9,7 @@ import trimesh
 from pipeline.config import ObjectsConfig
 from pipeline.errors import MeshError
 from pipeline.geometry.catalogue import finish_object, measure_object
-from pipeline.geometry.mesh_files import list_mesh_files, object_names
+from pipeline.geometry.mesh_folders import list_mesh_files, object_names
 from pipeline.geometry.shape import volume
 from pipeline.geometry.urdf_files import load_object_file, standalone
 
