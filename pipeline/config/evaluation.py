@@ -73,7 +73,10 @@ class PolicyConfig(Section):
         0.015, ge=0, description="how far one correction may move the contact [m]"
     )
     correction_tilt_rad: float = Field(
-        0.3, gt=0, le=math.pi, description="how far one correction may turn the approach [rad]"
+        0.3,
+        gt=0,
+        le=math.pi,
+        description="most turn of the approach at commit_m; more farther off [rad]",
     )
     commit_m: float = Field(
         0.03, ge=0, description="this near to the contact nothing is corrected any more [m]"
@@ -87,11 +90,8 @@ class PolicyConfig(Section):
     correction_gain: float = Field(
         0.02, ge=0, le=1, description="rise of q-hat that a correction must promise [1]"
     )
-    pictures_kept: int = Field(
-        2, ge=0, le=8, description="pictures of the wrist that a correction looks at beside its own"
-    )
-    gone_share: float = Field(
-        0.05, ge=0, le=1, description="share of them looked through that tells a moved object [1]"
+    new_choices: int = Field(
+        2, ge=0, description="how often all is chosen anew where nothing is left near the aim"
     )
     smoothing_m: float = Field(
         0.007, ge=0, description="q-hat is averaged over neighbours this near [m]"

@@ -1,7 +1,5 @@
 """The local phase's one step: look at the aim again, and move it where that promises more."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from jaxtyping import Float
 
@@ -17,20 +15,23 @@ _VOXEL_M = 0.002
 
 
 def corrected(
-    pictures: Sequence[DepthPicture],
+    picture: DepthPicture,
     aim: Float[np.ndarray, "4 4"],
+    left_m: float,
     ranking: Ranking,
     config: EvaluateConfig,
     normal_radius_m: float,
     rng: np.random.Generator,
 ) -> tuple[Float[np.ndarray, "4 4"], float] | None:
-    """The pose to aim at now and its q-hat; None where the pictures show nothing to go by.
+    """The pose to aim at now and its q-hat; None where the picture shows nothing to go by.
 
     The aim itself, as it is seen now, is the first candidate: another must promise more by
     ``correction_gain``, so that noise does not move the gripper to and fro.
+
+    left_m : way to the aim; the longer, the more room to swing round.
     """
     policy = config.policy
-    cloud = merged_cloud(pictures, _VOXEL_M)
+    cloud = merged_cloud([picture], _VOXEL_M)
     near = sample_near(
         cloud,
         aim[:3, 3],
@@ -41,12 +42,12 @@ def corrected(
         rng,
     )
     free = free_of_collision(near.world_from_contact, cloud.points_m, config.hand)
-    # Near the contact the gripper has no room left to swing round.
-    alike = near.world_from_contact[:, :3, 2] @ aim[:3, 2] >= np.cos(policy.correction_tilt_rad)
+    turn_rad = policy.correction_tilt_rad * max(left_m / policy.commit_m, 1.0)
+    alike = near.world_from_contact[:, :3, 2] @ aim[:3, 2] >= np.cos(min(turn_rad, np.pi))
     near = near.take(free & alike)
     if len(near) == 0:
         return None
-    quality = ranking(pictures, near)
+    quality = ranking([picture], near)
     best = int(np.argmax(quality))
     if quality[best] < quality[0] + policy.correction_gain:
         best = 0

@@ -1,9 +1,11 @@
 """How fast what is aimed at passes by: where its heights have gone since it was first seen.
 
-Heights above the table, on a grid of the world, are compared with those of an earlier picture:
-the shift with the least sum of squared differences, over the time between the two, is the
-velocity. Objects move on the table, so the shift is level.
+Heights above the table, on a grid of the world, are compared with those of an earlier picture
+where both were looked at: the shift with the least mean squared difference, over the time between
+the two, is the velocity. Objects move on the table, so the shift is level.
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
@@ -11,23 +13,23 @@ from scipy.ndimage import maximum_filter
 from scipy.signal import correlate
 
 _CELL_M = 0.002
-_HALF_CELLS = 30  # 60 mm to each side of the aim are compared
 _REACH_CELLS = 20  # shifts up to 40 mm
 _REFRESH_CELLS = 12  # after this shift the earlier picture is replaced
+_LEAST_OVERLAP = 0.4
 # A shift is known to about a cell's half; less than this in the time between is standing still.
 _STILL_M = 0.002
 # What a shift must explain of the earlier heights, squared: on an even surface any fits as well.
 _EXPLAINED = 0.03
 
-Map = Float[np.ndarray, "n n"]
-
 
 class Motion:
     """Velocity of what lies around the aim, picture by picture, one control period apart."""
 
-    def __init__(self, period_s: float) -> None:
+    def __init__(self, period_s: float, seen_m: float) -> None:
+        """seen_m : how far around the aim, level, a picture shows all there is."""
         self._period_s = period_s
-        self._before: Map | None = None
+        self._seen_cells = int(seen_m / _CELL_M)
+        self._before: HeightMap | None = None
         self._middle_m = np.zeros(2)
         self._periods = 0
         self.velocity_m_s = np.zeros(3)
@@ -43,7 +45,7 @@ class Motion:
         if self._before is None or self._periods == 0:
             self._begin(points_m, aim_m)
             return
-        after = height_map(points_m, self._middle_m, _HALF_CELLS + _REACH_CELLS)
+        after = self._map(points_m, aim_m, self._seen_cells + _REACH_CELLS)
         shift_m = _CELL_M * shift_between(self._before, after)
         size = float(np.linalg.norm(shift_m))
         time_s = self._periods * self._period_s
@@ -53,31 +55,71 @@ class Motion:
 
     def _begin(self, points_m: Float[np.ndarray, "n 3"], aim_m: Float[np.ndarray, " 3"]) -> None:
         self._middle_m, self._periods = aim_m[:2].copy(), 0
-        self._before = height_map(points_m, self._middle_m, _HALF_CELLS)
+        self._before = self._map(points_m, aim_m, self._seen_cells)
+
+    def _map(
+        self, points_m: Float[np.ndarray, "n 3"], aim_m: Float[np.ndarray, " 3"], half_cells: int
+    ) -> "HeightMap":
+        aside = (aim_m[:2] - self._middle_m) / _CELL_M
+        return height_map(
+            (points_m - [*self._middle_m, 0.0]) / [_CELL_M, _CELL_M, 1.0],
+            aside,
+            self._seen_cells,
+            half_cells,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class HeightMap:
+    """Cells of a square. height_m : 0 where nothing stands. seen : 1 where it was looked at."""
+
+    height_m: Float[np.ndarray, "n n"]
+    seen: Float[np.ndarray, "n n"]
 
 
 def height_map(
-    points_m: Float[np.ndarray, "n 3"], middle_m: Float[np.ndarray, " 2"], half_cells: int
-) -> Map:
-    """Greatest height about each cell of a square around a place; 0 where nothing was measured."""
+    points: Float[np.ndarray, "n 3"],
+    looked_at: Float[np.ndarray, " 2"],
+    radius_cells: int,
+    half_cells: int,
+) -> HeightMap:
+    """Greatest height about each cell, as far as was looked.
+
+    points : x, y in cells from the middle of the square; z [m].
+    looked_at, radius_cells : the disc that was looked at, in cells.
+    """
     heights = np.zeros((2 * half_cells + 1,) * 2)
-    cell = np.round((points_m[:, :2] - middle_m) / _CELL_M).astype(np.int64) + half_cells
+    cell = np.round(points[:, :2]).astype(np.int64) + half_cells
     inside = (cell >= 0).all(axis=1) & (cell < len(heights)).all(axis=1)
-    np.maximum.at(heights, tuple(cell[inside].T), points_m[inside, 2])
-    return np.asarray(maximum_filter(heights, size=3))  # points are sparser than cells
+    np.maximum.at(heights, tuple(cell[inside].T), points[inside, 2])
+    heights = maximum_filter(heights, size=3)  # points are sparser than cells
+    at = np.arange(-half_cells, half_cells + 1)
+    aside = np.hypot(at[:, None] - looked_at[0], at[None, :] - looked_at[1])
+    seen = (aside <= radius_cells).astype(np.float64)
+    return HeightMap(heights * seen, seen)
 
 
-def shift_between(before: Map, after: Float[np.ndarray, "m m"]) -> Float[np.ndarray, " 2"]:
+def shift_between(before: HeightMap, after: HeightMap) -> Float[np.ndarray, " 2"]:
     """By how many cells the heights have moved, to a fraction of one; 0 where none fits better.
 
     after : the same place in a larger square; what it is larger by bounds the shift.
     """
-    energy = correlate(after**2, np.ones_like(before), mode="valid", method="fft")
-    likeness = correlate(after, before, mode="valid", method="fft")
-    misfit = energy - 2.0 * likeness
+
+    def correlated(a: Float[np.ndarray, "m m"], b: Float[np.ndarray, "n n"]) -> np.ndarray:
+        return np.asarray(correlate(a, b, mode="valid", method="fft"))
+
+    both = correlated(after.seen, before.seen)
+    squares = (
+        correlated(after.seen, before.height_m**2)
+        - 2.0 * correlated(after.height_m, before.height_m)
+        + correlated(after.height_m**2, before.seen)
+    )
+    enough = both >= _LEAST_OVERLAP * before.seen.sum()
+    misfit = np.where(enough, squares / np.maximum(both, 1.0), np.inf)
     least = np.array(np.unravel_index(np.argmin(misfit), misfit.shape))
     middle = np.array(misfit.shape) // 2
-    if misfit[tuple(middle)] - misfit[tuple(least)] < _EXPLAINED * float(np.sum(before**2)):
+    explained = misfit[tuple(middle)] - misfit[tuple(least)]
+    if not explained >= _EXPLAINED * np.sum(before.height_m**2) / before.seen.sum():
         return np.zeros(2)
     return np.asarray(least - middle + _between_cells(misfit, least))
 
@@ -93,5 +135,5 @@ def _between_cells(
         aside = np.eye(2, dtype=np.int64)[axis]
         left, here, right = (misfit[tuple(least + sign * aside)] for sign in (-1, 0, 1))
         bend = left - 2.0 * here + right
-        found[axis] = 0.5 * (left - right) / bend if bend > 0 else 0.0
+        found[axis] = 0.5 * (left - right) / bend if 0 < bend < np.inf else 0.0
     return found

@@ -19,7 +19,7 @@ from pipeline.control.candidates import Candidates, sample_candidates
 from pipeline.control.clearance import free_of_collision
 from pipeline.control.cloud import Cloud, DepthPicture, merged_cloud
 from pipeline.control.correction import LOOK_M
-from pipeline.control.local_phase import LocalPhase
+from pipeline.control.local_phase import LocalPhase, way_left_m
 from pipeline.control.ranking import Ranking
 from pipeline.control.robot import Eyes, Reading, Robot, State
 from pipeline.control.viewpoints import best_apart, facing, gripper_above
@@ -102,6 +102,7 @@ class Attempt:
         self._ranked: list[tuple[float, Float[np.ndarray, "4 4"]]] = []
         self._rejected_m: list[Float[np.ndarray, " 3"]] = []
         self._local = LocalPhase(strategy.ranking, config, normal_radius_m, rng)
+        self._new_choices_left = config.policy.new_choices
         self._retargets_left = config.policy.retargets if strategy.corrects else 0
         self.decision = Decision()
 
@@ -126,13 +127,16 @@ class Attempt:
 
     def _choose(self) -> Cause | None:
         """The global phase: look from several viewpoints, then take the best that can be had."""
+        return self._choose_from(several_views=self._strategy.several_views)
+
+    def _choose_from(self, several_views: bool) -> Cause | None:
         pictures = self._eyes.static()
         if pictures is None:
             return Cause.CAMERA_STOPPED
         cloud = merged_cloud(pictures)
         if len(cloud) == 0:
             return Cause.EMPTY_CLOUD
-        if self._strategy.several_views:
+        if several_views:
             more = self._look_closer(pictures, cloud)
             if isinstance(more, Cause):
                 return more
@@ -174,7 +178,6 @@ class Attempt:
             if picture is None:
                 return Cause.CAMERA_STOPPED
             more.append(picture)
-            self._local.remember(picture)
         return more
 
     def _next_best(self, least: float) -> bool:
@@ -235,7 +238,7 @@ class Attempt:
 
     def _sees(self, aim: Float[np.ndarray, "4 4"], here: Float[np.ndarray, "4 4"]) -> bool:
         """Whether the aim is not too near: for the wrist's camera, or to go elsewhere."""
-        if (here[:3, 3] - aim[:3, 3]) @ aim[:3, 2] < self._policy.commit_m:
+        if way_left_m(aim, here) < self._policy.commit_m:
             return False
         camera = self._eyes.wrist_camera(here)
         distance = np.linalg.norm(aim[:3, 3] - camera.world_from_camera[:3, 3])
@@ -247,11 +250,19 @@ class Attempt:
         picture = self._eyes.wrist(aim[:3, 3], LOOK_M)
         if picture is None:
             return Cause.CAMERA_STOPPED
-        found = self._local.look(picture, aim)
+        found = self._local.look(picture, aim, self._robot.pose())
         if found is not None:
             self._aim(*found)
             self.decision.corrections += 1
+        elif self._new_choices_left > 0:
+            return self._choose_anew()
         return None
+
+    def _choose_anew(self) -> Cause | None:
+        """Nothing to grasp is left near the aim: again, in haste, from beside the table alone."""
+        self._new_choices_left -= 1
+        self._local.start_over()
+        return self._choose_from(several_views=False) or self._go_above()
 
     def _seal(self) -> Cause | None:
         """Vacuum on, and the first bit of the lift: a held object pulls."""
