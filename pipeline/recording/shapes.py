@@ -1,13 +1,14 @@
 """Meshes as Rerun shows them."""
 
+from dataclasses import dataclass
 from functools import lru_cache
 
+import manifold3d
 import numpy as np
 import rerun as rr
-import trimesh
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, Int, UInt8
 
-from pipeline.geometry.manifolds import from_manifold, to_manifold
+from pipeline.geometry.manifolds import to_manifold
 from pipeline.geometry.mesh import Mesh
 
 TOLERANCE_M = 2e-4  # how far an edge that collapses may move: too little to be seen
@@ -27,11 +28,11 @@ def shown_mesh(mesh: Mesh, colour: UInt8[np.ndarray, " 3"]) -> rr.Mesh3D:
 @lru_cache(maxsize=256)
 def _ready(mesh: Mesh, rgba: tuple[int, ...]) -> rr.Mesh3D:
     """Made once, however often it is logged."""
-    shown = _shaded(mesh)
+    shown = shaded(mesh)
     return rr.Mesh3D(
         vertex_positions=shown.vertices_m,
         triangle_indices=shown.faces,
-        vertex_normals=vertex_normals(shown),
+        vertex_normals=shown.normals,
         albedo_factor=rgba,
     )
 
@@ -48,37 +49,32 @@ def shown_facets(mesh: Mesh, colour: UInt8[np.ndarray, " 3"]) -> rr.Mesh3D:
     )
 
 
+@dataclass(frozen=True, eq=False)
+class Shaded:
+    """A mesh and its normals, one a vertex; the vertices of its sharp edges are doubled."""
+
+    vertices_m: Float[np.ndarray, "n 3"]
+    faces: Int[np.ndarray, "m 3"]
+    normals: Float[np.ndarray, "n 3"]
+
+
 @lru_cache(maxsize=256)
-def _shaded(mesh: Mesh) -> Mesh:
-    """Simplified but where it is small, with the vertices of its edges doubled."""
-    shown = mesh if len(mesh.faces) <= FEW_FACES else _simplified(mesh)
-    surface = trimesh.Trimesh(shown.vertices_m, shown.faces, process=False)
-    parted = trimesh.graph.smooth_shade(surface, angle=CREASE_RAD)
-    return Mesh(np.array(parted.vertices, dtype=np.float64), np.array(parted.faces, dtype=np.int64))
+def shaded(mesh: Mesh) -> Shaded:
+    """A closed mesh, simplified but where it is small, smooth but for its edges."""
+    solid = to_manifold(mesh) if len(mesh.faces) <= FEW_FACES else _simplified(mesh)
+    arrays = solid.calculate_normals(0, float(np.degrees(CREASE_RAD))).to_mesh64()
+    vertices = np.array(arrays.vert_properties, dtype=np.float64)
+    faces = np.array(arrays.tri_verts, dtype=np.int64)
+    return Shaded(vertices[:, :3], faces, vertices[:, 3:6])
 
 
-def _simplified(mesh: Mesh) -> Mesh:
+def _simplified(mesh: Mesh) -> manifold3d.Manifold:
     solid, tolerance_m = to_manifold(mesh), TOLERANCE_M
     simple = solid.simplify(tolerance_m)
     while simple.num_tri() > MOST_FACES:
         tolerance_m *= 2
         simple = solid.simplify(tolerance_m)
-    return from_manifold(simple)
-
-
-@lru_cache(maxsize=256)
-def vertex_normals(mesh: Mesh) -> Float[np.ndarray, "n 3"]:
-    """Area-weighted mean of the normals of the faces around each vertex."""
-    corners = mesh.vertices_m[mesh.faces]
-    face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals = np.zeros_like(mesh.vertices_m)
-    for corner in range(3):
-        for axis in range(3):
-            normals[:, axis] += np.bincount(
-                mesh.faces[:, corner], weights=face[:, axis], minlength=len(normals)
-            )
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.asarray(normals / np.maximum(lengths, 1e-30))
+    return simple
 
 
 def shown_pose(world_from_frame: Float[np.ndarray, "4 4"]) -> rr.Transform3D:
