@@ -58,7 +58,7 @@ def step_ms(
             window = window_around(camera, aim[:3, 3], LOOK_M)
             picture = DepthPicture(measured_depth(window, surfaces, None, rng), window)
             times.append(time.perf_counter())
-            found = local.look(picture, aim, pose)
+            found = local.look(picture, aim)
             local.passed_on(aim)
             if found is None:
                 break  # too steep a place: no network was asked

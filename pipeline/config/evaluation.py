@@ -73,10 +73,7 @@ class PolicyConfig(Section):
         0.015, ge=0, description="how far one correction may move the contact [m]"
     )
     correction_tilt_rad: float = Field(
-        0.3,
-        gt=0,
-        le=math.pi,
-        description="most turn of the approach at commit_m; more farther off [rad]",
+        0.3, gt=0, le=math.pi, description="how far one correction may turn the approach [rad]"
     )
     commit_m: float = Field(
         0.03, ge=0, description="this near to the contact nothing is corrected any more [m]"
@@ -88,7 +85,7 @@ class PolicyConfig(Section):
         0.1, ge=0, le=1, description="what q-hat another must promise more for that [1]"
     )
     correction_gain: float = Field(
-        0.02, ge=0, le=1, description="rise of q-hat that a correction must promise [1]"
+        0.1, ge=0, le=1, description="rise of q-hat that a correction must promise [1]"
     )
     new_choices: int = Field(
         2, ge=0, description="how often all is chosen anew where nothing is left near the aim"

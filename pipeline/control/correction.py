@@ -17,7 +17,6 @@ _VOXEL_M = 0.002
 def corrected(
     picture: DepthPicture,
     aim: Float[np.ndarray, "4 4"],
-    left_m: float,
     ranking: Ranking,
     config: EvaluateConfig,
     normal_radius_m: float,
@@ -27,8 +26,6 @@ def corrected(
 
     The aim itself, as it is seen now, is the first candidate: another must promise more by
     ``correction_gain``, so that noise does not move the gripper to and fro.
-
-    left_m : way to the aim; the longer, the more room to swing round.
     """
     policy = config.policy
     cloud = merged_cloud([picture], _VOXEL_M)
@@ -42,8 +39,8 @@ def corrected(
         rng,
     )
     free = free_of_collision(near.world_from_contact, cloud.points_m, config.hand)
-    turn_rad = policy.correction_tilt_rad * max(left_m / policy.commit_m, 1.0)
-    alike = near.world_from_contact[:, :3, 2] @ aim[:3, 2] >= np.cos(min(turn_rad, np.pi))
+    # Near the contact the gripper has no room left to swing round.
+    alike = near.world_from_contact[:, :3, 2] @ aim[:3, 2] >= np.cos(policy.correction_tilt_rad)
     near = near.take(free & alike)
     if len(near) == 0:
         return None

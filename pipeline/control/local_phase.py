@@ -36,13 +36,12 @@ class LocalPhase:
         """Another place is aimed at: how the last one moved says nothing of it."""
         self._motion = Motion(1.0 / self._config.policy.rate_hz, 0.9 * LOOK_M)
 
-    def look(self, picture: DepthPicture, aim: Pose, here: Pose) -> tuple[Pose, float] | None:
+    def look(self, picture: DepthPicture, aim: Pose) -> tuple[Pose, float] | None:
         """The pose to aim at now and its q-hat; None where there is nothing to go by."""
         self._motion.see(merged_cloud([picture]).points_m, aim[:3, 3])
         return corrected(
             picture,
             aim,
-            way_left_m(aim, here),
             self._ranking,
             self._config,
             self._normal_radius_m,

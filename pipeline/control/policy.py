@@ -250,7 +250,7 @@ class Attempt:
         picture = self._eyes.wrist(aim[:3, 3], LOOK_M)
         if picture is None:
             return Cause.CAMERA_STOPPED
-        found = self._local.look(picture, aim, self._robot.pose())
+        found = self._local.look(picture, aim)
         if found is not None:
             self._aim(*found)
             self.decision.corrections += 1
@@ -259,10 +259,16 @@ class Attempt:
         return None
 
     def _choose_anew(self) -> Cause | None:
-        """Nothing to grasp is left near the aim: again, in haste, from beside the table alone."""
+        """Nothing to grasp is left near the aim: again, in haste, from beside the table alone.
+
+        Where that finds nothing either, the aim stays.
+        """
         self._new_choices_left -= 1
         self._local.start_over()
-        return self._choose_from(several_views=False) or self._go_above()
+        cause = self._choose_from(several_views=False)
+        if cause is None:
+            return self._go_above()
+        return cause if cause is Cause.CAMERA_STOPPED else None
 
     def _seal(self) -> Cause | None:
         """Vacuum on, and the first bit of the lift: a held object pulls."""
