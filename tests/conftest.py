@@ -16,6 +16,11 @@ LONGEST = (
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Files named above first, in that order; all else as found."""
+    """Files named above first, in that order, then other tests of whole stages, then the rest."""
     first = {HERE / name: rank for rank, name in enumerate(LONGEST)}
-    items.sort(key=lambda item: first.get(item.path, len(first)))
+
+    def rank(item: pytest.Item) -> int:
+        of_stages = item.path.parent == HERE / "stages"
+        return first.get(item.path, len(first) + (not of_stages))
+
+    items.sort(key=rank)

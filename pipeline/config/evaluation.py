@@ -68,6 +68,9 @@ class PolicyConfig(Section):
         math.radians(50), ge=0, lt=math.pi / 2, description="approach off the vertical [rad]"
     )
     rate_hz: float = Field(15.0, gt=0, description="closed-loop rate; Supplement VI: 15 [Hz]")
+    approach_max_s: float = Field(
+        10.0, gt=0.5, le=120, description="longest way down, corrections and all [s]"
+    )
     standoff_m: float = Field(0.20, gt=0.02, le=1, description="where the approach begins [m]")
     correction_radius_m: float = Field(
         0.015, ge=0, description="how far one correction may move the contact [m]"

@@ -36,6 +36,11 @@ class LocalPhase:
         """Another place is aimed at: how the last one moved says nothing of it."""
         self._motion = Motion(1.0 / self._config.policy.rate_hz, 0.9 * LOOK_M)
 
+    @property
+    def moves(self) -> bool:
+        """Whether what is aimed at passes by."""
+        return bool(self._motion.velocity_m_s.any())
+
     def look(self, picture: DepthPicture, aim: Pose) -> tuple[Pose, float] | None:
         """The pose to aim at now and its q-hat; None where there is nothing to go by."""
         self._motion.see(merged_cloud([picture]).points_m, aim[:3, 3])

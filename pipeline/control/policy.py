@@ -209,8 +209,11 @@ class Attempt:
         return self._travel(backed_off(self.decision.world_from_contact, self._policy.standoff_m))
 
     def _approach(self) -> Cause | None:
-        """The local phase: look, correct, step; until the pad touches."""
-        while True:
+        """The local phase: look, correct, step; until the pad touches.
+
+        What runs away is not chased for ever: nor past the robot's reach, nor longer than a while.
+        """
+        for _ in range(round(self._policy.approach_max_s * self._policy.rate_hz)):
             aim = self.decision.world_from_contact
             here = self._robot.pose()
             if self._strategy.corrects and self._sees(aim, here):
@@ -221,6 +224,8 @@ class Attempt:
                 if cause is not None:
                     return cause
                 aim = self.decision.world_from_contact
+            if self._local.moves and not self._robot.reachable(aim):
+                return Cause.UNREACHABLE
             ahead = backed_off(self._local.met(aim, here), -_SEARCH_M)
             reading = self._robot.step(ahead, self._policy.speed_m_s)
             self.decision.world_from_contact = self._local.passed_on(aim)
@@ -233,8 +238,9 @@ class Attempt:
             if event is Event.CONTACT:
                 return None
             if reading.arrived:
-                self._travel(backed_off(self._robot.pose(), _RETREAT_M + _SEARCH_M))
-                return Cause.NO_CONTACT
+                break
+        self._travel(backed_off(self._robot.pose(), _RETREAT_M + _SEARCH_M))
+        return Cause.NO_CONTACT
 
     def _sees(self, aim: Float[np.ndarray, "4 4"], here: Float[np.ndarray, "4 4"]) -> bool:
         """Whether the aim is not too near: for the wrist's camera, or to go elsewhere."""

@@ -159,6 +159,25 @@ def test_it_meets_an_object_that_passes(passes_m_s: float) -> None:
     assert np.linalg.norm(decision.world_from_contact[:2, 3] - middle) < 0.012
 
 
+def test_what_runs_away_is_not_chased_for_ever() -> None:
+    robot = FakeRobot(TOP_M)
+    eyes = FakeEyes(plate()[::3], robot)
+    step = robot.step
+
+    def fleeing(world_from_gripper: np.ndarray, speed_m_s: float) -> Reading:
+        eyes.points = eyes.points + np.array([0.02, 0.0, 0.0])
+        reading = step(world_from_gripper, speed_m_s)
+        travels = speed_m_s == CONFIG.policy.travel_m_s
+        return replace(reading, wrench=np.zeros(6), arrived=reading.arrived and travels)
+
+    robot.enter = lambda state: setattr(  # type: ignore[method-assign]
+        robot, "step", fleeing if state is State.APPROACH else step
+    )
+    rng = np.random.default_rng(0)
+    decision = Attempt(eyes, robot, CLOSED, CONFIG, RADIUS_M, rng).run()
+    assert decision.cause in (Cause.NO_CONTACT, Cause.UNREACHABLE)
+
+
 def test_without_corrections_the_first_pose_stands() -> None:
     decision, eyes = tried(plate(), FakeRobot(TOP_M), OPEN)
     assert eyes.wrist_looks == decision.corrections == 0
