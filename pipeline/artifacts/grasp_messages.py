@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 
-from pipeline.artifacts.tensors import tensors_of, to_tensor
+from pipeline.artifacts.tensors import set_tensors, tensors_of
 from pipeline.errors import ContentError
 from schemas.softgrip.v1.grasps_pb2 import DrapedPads, GraspBatch
 
@@ -112,11 +112,8 @@ def grasp_batch(origin: GraspOrigin, grasps: LabelledGrasps) -> GraspBatch:
         proposal_names=origin.proposal_names,
         pad_vertices=grasps.contact_mask.shape[1],
     )
-    for name, dtype in STORED_AS.items():
-        array = getattr(grasps, name)
-        if name == "contact_mask":
-            array = np.packbits(array, axis=1)
-        getattr(message, name).CopyFrom(to_tensor(array.astype(dtype)))
+    packed = {"contact_mask": np.packbits(grasps.contact_mask, axis=1)}
+    set_tensors(message, vars(grasps) | packed, STORED_AS)
     return message
 
 
@@ -166,8 +163,7 @@ class ShownPads:
 def pads_message(pads: ShownPads) -> DrapedPads:
     """The message of some pads."""
     message = DrapedPads()
-    for name, dtype in PADS_STORED_AS.items():
-        getattr(message, name).CopyFrom(to_tensor(getattr(pads, name).astype(dtype)))
+    set_tensors(message, vars(pads), PADS_STORED_AS)
     return message
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from pipeline.artifacts.names import file_name
 from pipeline.artifacts.reading import open_artifact
-from pipeline.artifacts.tensors import from_tensor, tensors_of, to_tensor
+from pipeline.artifacts.tensors import from_tensor, set_tensors, tensors_of, to_tensor
 from pipeline.errors import ContentError
 from pipeline.geometry.catalogue import CatalogueObject, Material
 from pipeline.geometry.mesh import Mesh
@@ -85,10 +85,9 @@ def read_objects(path: Path) -> dict[str, tuple[CatalogueObject, str]]:
 
 
 def _mesh_message(mesh: Mesh) -> objects_pb2.TriangleMesh:
-    return objects_pb2.TriangleMesh(
-        vertices_m=to_tensor(mesh.vertices_m.astype(np.float64)),
-        faces=to_tensor(mesh.faces.astype(np.uint32)),
-    )
+    message = objects_pb2.TriangleMesh()
+    set_tensors(message, vars(mesh), MESH_STORED_AS)
+    return message
 
 
 def _mesh(message: objects_pb2.TriangleMesh) -> Mesh:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pipeline.artifacts.tensors import tensors_of, to_tensor
+from pipeline.artifacts.tensors import set_tensors, tensors_of
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 
 STORED_AS = {
@@ -59,8 +59,7 @@ def joined_samples(parts: list[Samples]) -> Samples:
 def sample_batch(samples: Samples, object_names: tuple[str, ...]) -> SampleBatch:
     """The message of some samples."""
     message = SampleBatch(object_names=object_names)
-    for name, dtype in STORED_AS.items():
-        getattr(message, name).CopyFrom(to_tensor(getattr(samples, name).astype(dtype)))
+    set_tensors(message, vars(samples), STORED_AS)
     return message
 
 

@@ -104,23 +104,28 @@ def scene_count(path: Path) -> int:
 def read_scene(path: Path, index: int) -> ClutterScene:
     """Scene ``index`` with its images."""
     with open_artifact(path) as artifact:
-        for time_ns, message in artifact.messages(scenes_pb2.Scene, at_ns=index * NS_PER_SCENE):
-            return _scene(artifact, message, time_ns)
-    raise ArtifactError(f"{path} holds no scene {index}", "Make the scenes again")
+        message, time_ns = _message(artifact, index)
+        return _scene(artifact, message, time_ns)
 
 
 def read_placed(path: Path, index: int) -> tuple[PlacedObject, ...]:
     """The objects of scene ``index`` where they lie, no image read."""
     with open_artifact(path) as artifact:
-        for _, message in artifact.messages(scenes_pb2.Scene, at_ns=index * NS_PER_SCENE):
-            return _placed(message)
-    raise ArtifactError(f"{path} holds no scene {index}", "Make the scenes again")
+        message, _ = _message(artifact, index)
+        return _placed(message)
 
 
 def read_scenes(path: Path) -> Iterator[ClutterScene]:
     """All scenes, in order, one in memory at a time."""
     for index in range(scene_count(path)):
         yield read_scene(path, index)
+
+
+def _message(artifact: Artifact, index: int) -> tuple[scenes_pb2.Scene, int]:
+    """Scene ``index`` and its time [ns]. Raises ArtifactError where there is none."""
+    for time_ns, message in artifact.messages(scenes_pb2.Scene, at_ns=index * NS_PER_SCENE):
+        return message, time_ns
+    raise ArtifactError(f"{artifact.path} holds no scene {index}", "Make the scenes again")
 
 
 def _scene(artifact: Artifact, message: scenes_pb2.Scene, time_ns: int) -> ClutterScene:

@@ -52,6 +52,17 @@ def from_tensor(tensor: Tensor) -> np.ndarray:
     return np.frombuffer(tensor.data, dtype=dtype).reshape(shape)
 
 
+def set_tensors(
+    message: Message, arrays: Mapping[str, np.ndarray], stored_as: Mapping[str, str]
+) -> None:
+    """Fill several tensors of a message, each converted to its dtype.
+
+    arrays : those that ``stored_as`` names, and any others.
+    """
+    for name, dtype in stored_as.items():
+        getattr(message, name).CopyFrom(to_tensor(arrays[name].astype(dtype)))
+
+
 def tensors_of(
     message: Message, stored_as: Mapping[str, str], shapes: Mapping[str, str]
 ) -> dict[str, np.ndarray]:

@@ -20,7 +20,6 @@ from pipeline.sensing.depth_by_rays import measured_depth, window_around
 from pipeline.simulation.eyes import gripper_from_camera, moved
 
 SCORE_BATCH = 64
-STEP_M = 0.017  # what the gripper comes down in a control step
 
 
 def step_ms(
@@ -44,6 +43,7 @@ def step_ms(
     view = scene.views[0]
     aims = merged_cloud([DepthPicture(view.depth_m, view.camera)]).points_m
     on_wrist = camera_at("wrist", config.cameras.wrist, np.zeros(3), 1.0, 0.0, 0.0)
+    step_m = config.evaluate.policy.speed_m_s / config.evaluate.policy.rate_hz
     seen: list[float] = []
     decided: list[float] = []
     while len(decided) < steps:
@@ -51,7 +51,7 @@ def step_ms(
         aim[:3, 3] = aims[rng.integers(len(aims))]
         local = LocalPhase(ranking, config.evaluate, config.grasps.normal_radius_m, rng)
         # All the way down, as far as the camera sees.
-        for height_m in np.arange(config.evaluate.policy.standoff_m, 0.11, -STEP_M):
+        for height_m in np.arange(config.evaluate.policy.standoff_m, 0.11, -step_m):
             pose = gripper_above(aim[:3, 3], height_m, np.eye(4))
             camera = moved(on_wrist, pose @ gripper_from_camera(config.evaluate.hand))
             times: list[float] = [time.perf_counter()]

@@ -6,7 +6,8 @@ from pydantic import Field
 
 from pipeline.config.section import Section
 
-Channels = Annotated[int, Field(ge=2, le=8192)]
+_Channels = Annotated[int, Field(ge=2, le=8192)]
+StageChannels = tuple[_Channels, _Channels, _Channels, _Channels]
 
 
 class ShardsConfig(Section):
@@ -21,7 +22,7 @@ class NetworkConfig(Section):
     """GA-CNN: a two-layer stem and four attention stages; Supplement IV."""
 
     layers: int = Field(18, ge=18, le=102, description="weighted layers; Supplement IV: 52")
-    channels: tuple[Channels, Channels, Channels, Channels] = Field(
+    channels: StageChannels = Field(
         (16, 32, 64, 128), description="channels of the four stages; IV: 64-128-256-512"
     )
     attention: Literal["cbam", "none"] = Field("cbam", description="'none' is the ablation")
@@ -55,7 +56,7 @@ class SweepConfig(Section):
         min_length=1,
         description="weighted layers; IV: from 18 to 102",
     )
-    channels: tuple[tuple[Channels, Channels, Channels, Channels], ...] = Field(
+    channels: tuple[StageChannels, ...] = Field(
         ((8, 16, 32, 64), (16, 32, 64, 128), (32, 64, 128, 256), (64, 128, 256, 512)),
         min_length=1,
         description="channel sets; IV: four, of which 64-128-256-512 was chosen",
