@@ -48,15 +48,14 @@ def cached_split(index: Path, split: str, cache: Path) -> Samples:
             shards = dict(zip(listed_shards(index, [split]), entries, strict=True))
             scratch = cache / f".{split}.part"
             shutil.rmtree(scratch, ignore_errors=True)
-            scratch.mkdir()
             try:
+                scratch.mkdir()
                 decode_shards(shards, scratch)
-            except BaseException:  # an interrupt leaves nothing half either
-                shutil.rmtree(scratch)
-                raise
-            for older in cache.glob(f"{split}-*"):
-                shutil.rmtree(older)
-            scratch.rename(folder)
+                for older in cache.glob(f"{split}-*"):
+                    shutil.rmtree(older)
+                scratch.rename(folder)
+            finally:  # whatever happens, an interrupt of the first call included
+                shutil.rmtree(scratch, ignore_errors=True)
     return mapped_samples(folder)
 
 

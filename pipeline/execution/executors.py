@@ -11,6 +11,8 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing import resource_tracker
 from typing import Literal, TypeVar
 
 from pipeline.errors import SoftgripError
@@ -50,9 +52,8 @@ def run_in_order(
     if workers <= 1:
         yield from map(job, items)
         return
-    pool = ProcessPoolExecutor(
-        workers, multiprocessing.get_context("spawn"), initializer=_leave_interrupts_to_the_driver
-    )
+    resource_tracker.ensure_running()  # once it runs, starting a worker lifts no signal mask
+    pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"))
     waiting: deque[Future[Result]] = deque()
     try:
         for item in items:
@@ -76,15 +77,26 @@ def run_in_order(
 def _submitted(
     pool: ProcessPoolExecutor, job: Callable[[Item], Result], item: Item
 ) -> Future[Result]:
-    """``pool.submit``, which may have to start a process just as the pool breaks.
+    """``pool.submit``, which may have to start a process, and that just as the pool breaks.
 
     The pool closes its pipes when a worker dies; starting another then fails on the closed ones.
     """
     try:
-        return pool.submit(job, item)
+        with _deaf_to_interrupts():
+            return pool.submit(job, item)
     except (ValueError, OSError) as error:
         raise BrokenProcessPool(f"no further worker could be started: {error}") from error
 
 
-def _leave_interrupts_to_the_driver() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+@contextmanager
+def _deaf_to_interrupts() -> Iterator[None]:
+    """What starts meanwhile never hears SIGINT, not even while its interpreter starts.
+
+    A terminal sends it to the whole group; ending the run is the driver's part. The driver hears
+    it once it is out of here.
+    """
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -85,6 +85,29 @@ def test_a_kill_while_decoding_leaves_nothing_that_passes_for_whole(
     assert not (cache / ".train.part").exists()
 
 
+@pytest.mark.parametrize("call", ["mkdir", "rename"])
+def test_an_interrupt_leaves_nothing_half(
+    tmp_path: Path, provenance: Provenance, monkeypatch: pytest.MonkeyPatch, call: str
+) -> None:
+    """A signal during a system call is raised as the call returns."""
+    index, cache = sharded(tmp_path, provenance, PARTS), tmp_path / "cache"
+    really = getattr(Path, call)
+
+    def interrupted(path: Path, *args: Path, **options: bool) -> None:
+        really(path, *args, **options)
+        if path.name == ".train.part":
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, call, interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            cached_split(index, "train", cache)
+    assert not (cache / ".train.part").exists()
+    np.testing.assert_array_equal(
+        cached_split(index, "train", cache).cloud, joined_samples(PARTS).cloud
+    )
+
+
 def test_a_shard_that_is_not_the_indexs_is_named(tmp_path: Path, provenance: Provenance) -> None:
     index = sharded(tmp_path, provenance, PARTS)
     shard_path(tmp_path / "shards", 0, 3).write_bytes(

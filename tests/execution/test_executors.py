@@ -49,6 +49,31 @@ def test_a_worker_killed_while_the_next_one_starts(pause_s: float) -> None:
     assert not multiprocessing.active_children()
 
 
+def test_workers_are_deaf_to_interrupts_from_their_first_moment() -> None:
+    """A terminal sends SIGINT to all; a worker whose interpreter starts would die of it."""
+
+    def items() -> Iterator[int]:
+        for item in range(6):
+            yield item
+            for process in multiprocessing.active_children():
+                assert process.pid is not None
+                os.kill(process.pid, signal.SIGINT)
+
+    assert list(run_in_order(square, items(), 2)) == [x * x for x in range(6)]
+
+
+def test_the_driver_hears_an_interrupt_that_came_while_a_worker_started() -> None:
+    def items() -> Iterator[int]:
+        yield 1
+        os.kill(os.getpid(), signal.SIGINT)
+        yield from range(1000)
+
+    with pytest.raises(KeyboardInterrupt):
+        list(run_in_order(square, items(), 2))
+    assert not multiprocessing.active_children()
+    assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
+
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_readable_failure_stays_readable_across_processes(workers: int) -> None:
     with pytest.raises(SoftgripError, match=r"item 0 is bad\. Leave it out"):
