@@ -2,6 +2,7 @@
 
 import difflib
 from collections import Counter
+from collections.abc import Collection
 from fnmatch import fnmatchcase
 from functools import partial
 from pathlib import Path
@@ -25,6 +26,7 @@ from pipeline.geometry.catalogue import (
     MeasuredObject,
     finish_object,
     measure_object,
+    stretched_copy,
 )
 from pipeline.geometry.mesh_folders import object_names
 from pipeline.geometry.parametric import PARAMETRIC_OBJECTS, parametric_source
@@ -57,6 +59,12 @@ def build(stage: StageContext) -> Summary:
     todo = [item for item in measured if item.source.name in split]
     results = run_in_order(finish, todo, stage.workers, stage.executor)
     objects = list(progress(results, len(todo), "objects: convex parts", "object"))
+    copies = stretched_copies(
+        [item for item in objects if split[item.name] == "train"], config, seed
+    )
+    check_names(copies, split)
+    objects += copies
+    split |= dict.fromkeys((item.name for item in copies), "train")
     publish(stage, objects, dict(split), refused)
     return summary(objects, dict(split), refused)
 
@@ -129,6 +137,26 @@ def finished(
 ) -> CatalogueObject:
     """Rescale one object and cut it into convex parts."""
     return finish_object(measured, config, generator(seed, "object", measured.source.name), cache)
+
+
+def stretched_copies(
+    items: list[CatalogueObject], config: ObjectsConfig, seed: int
+) -> list[CatalogueObject]:
+    """As many further shapes of each object as are asked for."""
+    return [
+        stretched_copy(item, name, config, generator(seed, "object", name))
+        for item in items
+        for name in (f"{item.name}-stretched-{k + 1}" for k in range(config.stretched_copies))
+    ]
+
+
+def check_names(copies: list[CatalogueObject], taken: Collection[str]) -> None:
+    """Raise MeshError where a copy's name is that of an object."""
+    for item in copies:
+        if item.name in taken:
+            raise MeshError(
+                f"A mesh is named {item.name}, as a stretched copy would be", "Rename its file"
+            )
 
 
 def publish(

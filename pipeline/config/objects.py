@@ -30,6 +30,12 @@ class ObjectsConfig(Section):
     embedded_in_training: bool = Field(
         False, description="with MESH_DIR: train on the embedded objects too, test on meshes alone"
     )
+    stretched_copies: int = Field(
+        0, ge=0, le=100, description="further shapes made of each training object by stretching it"
+    )
+    stretch_max: float = Field(
+        1.5, ge=1, le=4, description="most that a copy is stretched along one axis over another [1]"
+    )
     unit: Literal["auto", "m", "cm", "mm", "in"] = Field(
         "auto", description="length unit of mesh files that do not declare one; auto = by extent"
     )

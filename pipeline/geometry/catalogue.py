@@ -1,6 +1,6 @@
 """The object catalogue: from a source mesh to everything later stages need of an object."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Literal
@@ -13,7 +13,7 @@ from pipeline.geometry.convex_parts import convex_parts
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.mesh_files import MeshSource, UnitSource
 from pipeline.geometry.repair import repair
-from pipeline.geometry.rescaling import draw_target_extent, rescale
+from pipeline.geometry.rescaling import draw_stretch, draw_target_extent, rescale
 from pipeline.geometry.shape import (
     ShapeClass,
     mass_properties,
@@ -51,6 +51,8 @@ class CatalogueObject:
     repairs: tuple[str, ...]
     scale: float
     """Rescaled size over the source's size in metres [1]."""
+    stretch: Float[np.ndarray, " 3"]
+    """Further factors along the object's axes; ones but for a stretched copy [1]."""
     target_extent_m: float
     area_m2: float
     volume_m3: float
@@ -100,6 +102,7 @@ def finish_object(
         unit_known_by=source.unit_known_by,
         repairs=measured.repairs,
         scale=scale,
+        stretch=np.ones(3),
         target_extent_m=target,
         area_m2=surface_area(mesh),
         volume_m3=volume(mesh),
@@ -111,6 +114,43 @@ def finish_object(
         mesh=mesh,
         convex_parts=convex_parts(mesh, config.convex, cache_dir),
         material=material_of(source.name, config),
+    )
+
+
+def stretched_copy(
+    item: CatalogueObject, name: str, config: ObjectsConfig, rng: np.random.Generator
+) -> CatalogueObject:
+    """Another shape: the object stretched along its axes, at a size of its own.
+
+    An affine map keeps centroids, and keeps convex parts convex and covering: neither is searched
+    for again. NSVR and class are the copy's own.
+
+    rng: draws the factors, then the target extent.
+    """
+    stretch = draw_stretch(config, rng)
+    stretched = Mesh(item.mesh.vertices_m * stretch, item.mesh.faces)
+    target = float(stretched.extents_m.max())
+    if config.rescaled:
+        target = draw_target_extent(config, rng)
+    mesh, scale = rescale(stretched, target)
+    parts = [Mesh(part.vertices_m * (scale * stretch), part.faces) for part in item.convex_parts]
+    mass = mass_properties(mesh, config.density_kg_m3)
+    value = nsvr(mesh)
+    return replace(
+        item,
+        name=name,
+        scale=item.scale * scale,
+        stretch=item.stretch * stretch,
+        target_extent_m=target,
+        area_m2=surface_area(mesh),
+        volume_m3=volume(mesh),
+        nsvr=value,
+        shape_class=shape_class(value),
+        mass_kg=mass.mass_kg,
+        centre_of_mass_m=mass.centre_of_mass_m,
+        inertia_kg_m2=mass.inertia_kg_m2,
+        mesh=mesh,
+        convex_parts=tuple(parts),
     )
 
 

@@ -1,6 +1,7 @@
 """Sizes of the training objects: each mesh is rescaled to a drawn target; Supplement III."""
 
 import numpy as np
+from jaxtyping import Float
 
 from pipeline.config.objects import ObjectsConfig
 from pipeline.geometry.mesh import Mesh
@@ -9,6 +10,12 @@ from pipeline.geometry.mesh import Mesh
 def draw_target_extent(config: ObjectsConfig, rng: np.random.Generator) -> float:
     """Longest extent after rescaling, uniform between the configured bounds [m]."""
     return float(rng.uniform(config.target_extent_min_m, config.target_extent_max_m))
+
+
+def draw_stretch(config: ObjectsConfig, rng: np.random.Generator) -> Float[np.ndarray, " 3"]:
+    """Factors along the object's axes, their logarithms uniform; their product is 1."""
+    exponents = rng.uniform(-0.5, 0.5, 3)
+    return np.asarray(config.stretch_max ** (exponents - exponents.mean()))
 
 
 def rescale(mesh: Mesh, target_extent_m: float) -> tuple[Mesh, float]:

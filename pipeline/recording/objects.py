@@ -105,7 +105,8 @@ def _show_object(stream: rr.RecordingStream, path: str, item: CatalogueObject, s
             f"**{item.name}** ({split})\n\n"
             f"| | |\n|-|-|\n"
             f"| class | {item.shape_class}, NSVR {item.nsvr:.3f} |\n"
-            f"| longest extent | {1e3 * item.target_extent_m:.1f} mm (scale {item.scale:.4g}) |\n"
+            f"| longest extent | {1e3 * item.target_extent_m:.1f} mm (scale {item.scale:.4g}"
+            f"{_stretch(item)}) |\n"
             f"| mass | {1e3 * item.mass_kg:.0f} g |\n"
             f"| faces, convex parts | {len(item.mesh.faces)}, {len(item.convex_parts)} |\n"
             f"| source | {item.source}, unit {item.unit} ({item.unit_known_by}) |\n"
@@ -113,6 +114,12 @@ def _show_object(stream: rr.RecordingStream, path: str, item: CatalogueObject, s
             media_type=rr.MediaType.MARKDOWN,
         ),
     )
+
+
+def _stretch(item: CatalogueObject) -> str:
+    if np.all(item.stretch == 1.0):
+        return ""
+    return ", stretched " + " x ".join(f"{factor:.2f}" for factor in item.stretch)
 
 
 def _columns(objects: int) -> int:

@@ -104,6 +104,7 @@ def _box(scenario: Scenario) -> CatalogueObject:
         unit_known_by="declared",
         repairs=(),
         scale=1.0,
+        stretch=np.ones(3),
         target_extent_m=max(scenario.sides_m),
         area_m2=surface_area(mesh),
         volume_m3=volume(mesh),

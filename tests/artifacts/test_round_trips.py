@@ -141,6 +141,7 @@ def test_catalogue_objects_round_trip(
         unit_known_by="detected",
         repairs=("holes",) * parts,
         scale=rng.random(),
+        stretch=rng.random(3) if parts else np.ones(3),
         target_extent_m=rng.random(),
         area_m2=rng.random(),
         volume_m3=rng.random(),

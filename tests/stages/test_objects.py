@@ -55,6 +55,30 @@ def test_embedded_objects_stand_beside_meshes_in_training_alone(
     assert made["objects"] == 9
 
 
+def test_training_objects_alone_are_stretched_into_further_shapes(
+    tmp_path: Path, mesh_dir: Path
+) -> None:
+    config = "[objects]\nstretched_copies = 2\n[objects.convex]\ninput_faces = 200\n"
+    stage = context(tmp_path, mesh_dir, config)
+    made = objects.build(stage)
+    found = read_objects(stage.output)
+    training = [name for name, (_, where) in found.items() if where == "train"]
+    copies = [name for name in training if "-stretched-" in name]
+    originals = set(training) - set(copies)
+    assert sorted(copies) == sorted(f"{n}-stretched-{k}" for n in originals for k in (1, 2))
+    assert len(found) == 7 + len(copies) == made["objects"]
+    assert not any("-stretched-" in n for n, (_, where) in found.items() if where != "train")
+    assert len({tuple(found[name][0].mesh.extents_m) for name in training}) == len(training)
+
+
+def test_a_mesh_of_a_copys_name_is_an_error(tmp_path: Path, mesh_dir: Path) -> None:
+    for number in range(7):
+        (mesh_dir / f"box_{number}.ply").rename(mesh_dir / f"box{'-stretched-1' * number}.ply")
+    config = "[objects]\nstretched_copies = 1\n[objects.convex]\ninput_faces = 200\n"
+    with pytest.raises(MeshError, match=r"is named box.*-stretched-1, as a stretched copy would"):
+        objects.build(context(tmp_path, mesh_dir, config))
+
+
 def test_a_run_takes_meshes_or_embedded_objects_unless_told_otherwise(
     tmp_path: Path, mesh_dir: Path
 ) -> None:

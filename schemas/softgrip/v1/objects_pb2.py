@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from schemas.softgrip.v1 import tensor_pb2 as schemas_dot_softgrip_dot_v1_dot_tensor__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n!schemas/softgrip/v1/objects.proto\x12\x0bsoftgrip.v1\x1a schemas/softgrip/v1/tensor.proto\"[\n\x0cTriangleMesh\x12\'\n\nvertices_m\x18\x01 \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12\"\n\x05\x66\x61\x63\x65s\x18\x02 \x01(\x0b\x32\x13.softgrip.v1.Tensor\"\x9a\x03\n\x0f\x43\x61talogueObject\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\r\n\x05split\x18\x02 \x01(\t\x12\x0e\n\x06source\x18\x03 \x01(\t\x12\x15\n\rsource_sha256\x18\x04 \x01(\t\x12\x0c\n\x04unit\x18\x05 \x01(\t\x12\x13\n\x0bunit_origin\x18\x06 \x01(\t\x12\x0f\n\x07repairs\x18\x07 \x03(\t\x12\r\n\x05scale\x18\x08 \x01(\x01\x12\x10\n\x08\x65xtent_m\x18\t \x01(\x01\x12\x0f\n\x07\x61rea_m2\x18\n \x01(\x01\x12\x11\n\tvolume_m3\x18\x0b \x01(\x01\x12\x0c\n\x04nsvr\x18\x0c \x01(\x01\x12\x13\n\x0bshape_class\x18\r \x01(\t\x12\x0f\n\x07mass_kg\x18\x0e \x01(\x01\x12*\n\rinertia_kg_m2\x18\x0f \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12\'\n\x04mesh\x18\x10 \x01(\x0b\x32\x19.softgrip.v1.TriangleMesh\x12/\n\x0c\x63onvex_parts\x18\x11 \x03(\x0b\x32\x19.softgrip.v1.TriangleMesh\x12\x10\n\x08material\x18\x12 \x01(\t\"=\n\x0bRefusedMesh\x12\x0e\n\x06source\x18\x01 \x01(\t\x12\x0e\n\x06reason\x18\x02 \x01(\t\x12\x0e\n\x06remedy\x18\x03 \x01(\tb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n!schemas/softgrip/v1/objects.proto\x12\x0bsoftgrip.v1\x1a schemas/softgrip/v1/tensor.proto\"[\n\x0cTriangleMesh\x12\'\n\nvertices_m\x18\x01 \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12\"\n\x05\x66\x61\x63\x65s\x18\x02 \x01(\x0b\x32\x13.softgrip.v1.Tensor\"\xc0\x03\n\x0f\x43\x61talogueObject\x12\x0c\n\x04name\x18\x01 \x01(\t\x12\r\n\x05split\x18\x02 \x01(\t\x12\x0e\n\x06source\x18\x03 \x01(\t\x12\x15\n\rsource_sha256\x18\x04 \x01(\t\x12\x0c\n\x04unit\x18\x05 \x01(\t\x12\x13\n\x0bunit_origin\x18\x06 \x01(\t\x12\x0f\n\x07repairs\x18\x07 \x03(\t\x12\r\n\x05scale\x18\x08 \x01(\x01\x12\x10\n\x08\x65xtent_m\x18\t \x01(\x01\x12\x0f\n\x07\x61rea_m2\x18\n \x01(\x01\x12\x11\n\tvolume_m3\x18\x0b \x01(\x01\x12\x0c\n\x04nsvr\x18\x0c \x01(\x01\x12\x13\n\x0bshape_class\x18\r \x01(\t\x12\x0f\n\x07mass_kg\x18\x0e \x01(\x01\x12*\n\rinertia_kg_m2\x18\x0f \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12\'\n\x04mesh\x18\x10 \x01(\x0b\x32\x19.softgrip.v1.TriangleMesh\x12/\n\x0c\x63onvex_parts\x18\x11 \x03(\x0b\x32\x19.softgrip.v1.TriangleMesh\x12\x10\n\x08material\x18\x12 \x01(\t\x12$\n\x07stretch\x18\x13 \x01(\x0b\x32\x13.softgrip.v1.Tensor\"=\n\x0bRefusedMesh\x12\x0e\n\x06source\x18\x01 \x01(\t\x12\x0e\n\x06reason\x18\x02 \x01(\t\x12\x0e\n\x06remedy\x18\x03 \x01(\tb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -35,7 +35,7 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_TRIANGLEMESH']._serialized_start=84
   _globals['_TRIANGLEMESH']._serialized_end=175
   _globals['_CATALOGUEOBJECT']._serialized_start=178
-  _globals['_CATALOGUEOBJECT']._serialized_end=588
-  _globals['_REFUSEDMESH']._serialized_start=590
-  _globals['_REFUSEDMESH']._serialized_end=651
+  _globals['_CATALOGUEOBJECT']._serialized_end=626
+  _globals['_REFUSEDMESH']._serialized_start=628
+  _globals['_REFUSEDMESH']._serialized_end=689
 # @@protoc_insertion_point(module_scope)
