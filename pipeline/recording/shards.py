@@ -33,8 +33,13 @@ def blueprint() -> rrb.Blueprint:
                 row_shares=[3, 2],
             ),
             rrb.Vertical(
-                rrb.BarChartView(origin="/curves/quality/train", name="q in tenths: train"),
-                rrb.BarChartView(origin="/curves/quality/test", name="q in tenths: test"),
+                rrb.Horizontal(
+                    *(
+                        rrb.BarChartView(origin=f"/curves/quality/{split}", name=f"q: {split}")
+                        for split in ("train", "val", "test")
+                    ),
+                    name="q in tenths",
+                ),
                 rrb.BarChartView(origin="/curves/level", name="samples by level, 1 to 9"),
                 rrb.BarChartView(origin="/curves/class", name="by class: basic, typical, complex"),
                 rrb.TextDocumentView(origin="/notes/sample", name="Sample"),

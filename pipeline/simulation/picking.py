@@ -161,16 +161,18 @@ def run_clutter(
     clutter = Clutter(scene, objects, config, rng)
     strategy = strategy_of(policy, predict, config)
     attempts: list[Made] = []
-    failed: list[Float[np.ndarray, " 3"]] = []
+    spoilt_m: list[Float[np.ndarray, " 3"]] = []
+    in_a_row = 0
     while (
         clutter.bodies
         and len(attempts) < config.evaluate.attempts_per_clutter
-        and len(failed) < config.evaluate.failures_per_clutter
+        and in_a_row < config.evaluate.failures_per_clutter
     ):
-        made = clutter.attempted(strategy, failed)
+        made = clutter.attempted(strategy, spoilt_m)
         attempts.append(made)
         if made.cause is Cause.LIFTED:
-            failed = []
-        else:
-            failed = [*failed, made.decision.world_from_contact[:3, 3]]
+            in_a_row = 0
+        else:  # what did not hold once is not tried again, whatever is lifted in between
+            in_a_row += 1
+            spoilt_m.append(made.decision.world_from_contact[:3, 3])
     return attempts
