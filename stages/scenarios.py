@@ -17,7 +17,7 @@ import typer
 from pipeline.artifacts import publish_bytes
 from pipeline.config import RunConfig, load_run_config
 from pipeline.config.evaluation import PolicyName
-from pipeline.control.policy import Cause
+from pipeline.control.decision import Cause
 from pipeline.control.success import success_rate
 from pipeline.execution import RunFolder, generator, progress, run_command, run_in_order
 from pipeline.simulation.picking import Clutter, strategy_of

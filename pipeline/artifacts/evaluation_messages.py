@@ -4,7 +4,7 @@ import numpy as np
 
 from pipeline.artifacts.tensors import to_tensor
 from pipeline.control.cloud import DepthPicture
-from pipeline.control.policy import Cause
+from pipeline.control.decision import Cause
 from pipeline.simulation.picking import Made
 from schemas.softgrip.v1 import evaluation_pb2
 
@@ -45,6 +45,7 @@ def attempt_message(
         candidate_poses=to_tensor(decision.candidates.astype(np.float32)),
         candidate_quality=to_tensor(decision.quality.astype(np.float32)),
         corrections=decision.corrections,
+        regrasps=decision.regrasps,
         pictures=[picture_message(picture) for picture in decision.pictures],
         **{name: to_tensor(np.asarray(array, np.float64)) for name, array in arrays.items()},
     )

@@ -90,6 +90,15 @@ class PolicyConfig(Section):
     correction_gain: float = Field(
         0.1, ge=0, le=1, description="rise of q-hat that a correction must promise [1]"
     )
+    regrasps: int = Field(
+        2, ge=0, description="how often what broke away in the tug is grasped nearer to its centre"
+    )
+    regrasp_lever_m: float = Field(
+        0.015, ge=0, description="a lever felt in the tug that is worth a regrasp [m]"
+    )
+    regrasp_radius_m: float = Field(
+        0.025, gt=0, description="how near to the load's centre a regrasp is sought [m]"
+    )
     new_choices: int = Field(
         2, ge=0, description="how often all is chosen anew where nothing is left near the aim"
     )

@@ -3,27 +3,27 @@
 Global phase: clouds of several viewpoints are merged, u candidates sampled and ranked in one
 batch; those the robot cannot reach or that would collide are left out. Local phase: the wrist's
 camera looks again at every control step, and the contact is corrected, until the camera is too
-near; then straight on until contact. After that the wrench leads (Supplement VI). What is needed
-of the world is in `pipeline.control.robot`; each way to end has a name.
+near; then straight on until contact. After that the wrench leads (Supplement VI): what hung askew
+and broke away in the first tug is grasped once more, nearer to its centre. What is needed of the
+world is in `pipeline.control.robot`; each way to end is in `pipeline.control.decision`.
 """
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field
-from enum import StrEnum
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from jaxtyping import Float
 
-from pipeline.config.evaluation import EvaluateConfig, PolicyName
-from pipeline.control.candidates import Candidates, sample_candidates
+from pipeline.config.evaluation import EvaluateConfig
+from pipeline.control.candidates import Candidates, sample_candidates, sample_near
 from pipeline.control.clearance import free_of_collision
 from pipeline.control.cloud import Cloud, DepthPicture, merged_cloud
 from pipeline.control.correction import LOOK_M
+from pipeline.control.decision import Cause, Decision, Strategy
 from pipeline.control.local_phase import LocalPhase, way_left_m
-from pipeline.control.ranking import Ranking
+from pipeline.control.regrasp import hangs_below_m, top_of_column_m, worth_with_lever
 from pipeline.control.robot import Eyes, Reading, Robot, State
 from pipeline.control.viewpoints import best_apart, facing, gripper_above
-from pipeline.control.wrench_monitor import Event, WrenchMonitor, trimmed
+from pipeline.control.wrench_monitor import Event, WrenchMonitor, hanging_n, trimmed
 
 _SEARCH_M = 0.06  # past the expected contact the pad goes on at most this far
 _RETREAT_M = 0.05
@@ -31,49 +31,7 @@ _TUG_M = 0.01  # the first bit of the lift, in which a seal shows its pull
 _APART_M = 0.03  # another place to grasp, not the same once more
 _TRIM_FROM_M = 0.03  # clear of the neighbours
 
-
-class Cause(StrEnum):
-    """Why an attempt ended; LIFTED is the good one."""
-
-    LIFTED = "lifted"
-    CAMERA_STOPPED = "camera stopped"
-    EMPTY_CLOUD = "empty cloud"
-    NO_CANDIDATE = "no candidate"
-    UNREACHABLE = "unreachable"
-    COLLISION = "collision"
-    NO_CONTACT = "no contact"
-    NO_SEAL = "no seal"
-    LOST_IN_LIFT = "lost in lift"
-    LOST_IN_SHAKE = "lost in shake"
-    OFF_THE_TABLE = "object off the table"
-
-
-@dataclass(frozen=True)
-class Strategy:
-    """How attempts are made.
-
-    several_views : whether the wrist looks before the choice. corrects : whether it looks again
-    on the way down. trims : whether the lift lessens moments.
-    """
-
-    name: PolicyName
-    ranking: Ranking
-    several_views: bool
-    corrects: bool
-    trims: bool
-
-
-@dataclass(eq=False)
-class Decision:
-    """How an attempt went, as far as the policy knows; filled in as it goes."""
-
-    cause: Cause = Cause.EMPTY_CLOUD
-    candidates: Float[np.ndarray, "k 4 4"] = field(default_factory=lambda: np.empty((0, 4, 4)))
-    quality: Float[np.ndarray, " k"] = field(default_factory=lambda: np.empty(0))
-    predicted_quality: float = 0.0
-    world_from_contact: Float[np.ndarray, "4 4"] = field(default_factory=lambda: np.eye(4))
-    corrections: int = 0
-    pictures: list[DepthPicture] = field(default_factory=list)
+Phase = tuple[State, Callable[[], Cause | None]]
 
 
 class Attempt:
@@ -104,26 +62,36 @@ class Attempt:
         self._local = LocalPhase(strategy.ranking, config, normal_radius_m, rng)
         self._new_choices_left = config.policy.new_choices
         self._retargets_left = config.policy.retargets if strategy.corrects else 0
+        self._regrasps_left = config.policy.regrasps if strategy.feels else 0
         self.decision = Decision()
 
     def run(self) -> Decision:
         """Try once."""
-        cause = None
-        for state, phase in (
+        cause = self._through(
             (State.OBSERVE, self._choose),
-            (State.PREGRASP, self._go_above),
-            (State.APPROACH, self._approach),
-            (State.SEAL, self._seal),
+            *self._to_the_seal(),
             (State.LIFT, self._lift),
             (State.SHAKE, self._shake),
-        ):
-            self._robot.enter(state)
-            cause = phase()
-            if cause is not None:
-                break
+        )
         self._robot.enter(State.DONE)
         self.decision.cause = cause or Cause.LIFTED
         return self.decision
+
+    def _to_the_seal(self) -> tuple[Phase, ...]:
+        return (
+            (State.PREGRASP, self._go_above),
+            (State.APPROACH, self._approach),
+            (State.SEAL, self._seal),
+        )
+
+    def _through(self, *phases: Phase) -> Cause | None:
+        """One phase after the other, until one ends with a cause."""
+        for state, phase in phases:
+            self._robot.enter(state)
+            cause = phase()
+            if cause is not None:
+                return cause
+        return None
 
     def _choose(self) -> Cause | None:
         """The global phase: look from several viewpoints, then take the best that can be had."""
@@ -277,21 +245,57 @@ class Attempt:
         return cause if cause is Cause.CAMERA_STOPPED else None
 
     def _seal(self) -> Cause | None:
-        """Vacuum on, and the first bit of the lift: a held object pulls."""
+        """Vacuum on, and the first bit of the lift: a held object pulls.
+
+        What pulled and broke away was held too far from its centre of mass: nearer, once more.
+        """
         self._robot.vacuum(on=True)
         start = self._robot.pose()
-        reading = self._raise(start, _TUG_M)
-        if not self._monitor.holds(reading):
-            self._robot.vacuum(on=False)
-            self._travel(backed_off(start, _RETREAT_M))
+        readings = self._raise(start, _TUG_M)
+        if self._monitor.holds(readings[-1]):
+            return None
+        self._robot.vacuum(on=False)
+        self._travel(backed_off(start, _RETREAT_M))
+        if self._regrasps_left == 0 or not self._aims_nearer(max(readings, key=hanging_n)):
             return Cause.NO_SEAL
-        return None
+        self._regrasps_left -= 1
+        self.decision.regrasps += 1
+        return self._through(*self._to_the_seal())
+
+    def _aims_nearer(self, felt: Reading) -> bool:
+        """Whether there is a contact nearer to where the load hangs; then aim there."""
+        if not self._monitor.holds(felt):
+            return False
+        place = hangs_below_m(felt, self._config.hand.length_m)
+        lever_m = float(np.linalg.norm(place - felt.world_from_gripper[:2, 3]))
+        if lever_m < self._policy.regrasp_lever_m:
+            return False  # it is the seal that is weak
+        cloud = merged_cloud(self.decision.pictures)
+        top = top_of_column_m(cloud, place)
+        if top is None:
+            return False
+        found = self._unspoilt(self._sampled_near(cloud, top))
+        found = found.take(
+            free_of_collision(found.world_from_contact, cloud.points_m, self._config.hand)
+        )
+        if len(found) == 0:
+            return False
+        quality = self._strategy.ranking(self.decision.pictures, found)
+        worth = worth_with_lever(quality, found, place, lever_m, self._policy.regrasp_radius_m)
+        self._local.start_over()
+        self._retargets_left = 0  # what is felt outweighs what is seen
+        self._ranked = [
+            (float(quality[i]), found.world_from_contact[i])
+            for i in np.argsort(-worth, kind="stable")
+            if worth[i] > 0.0
+        ]
+        return self._next_best(least=0.0)
 
     def _lift(self) -> Cause | None:
         """Up, trimming the pose to lessen moments at the base; slower after a slip."""
         start = self._robot.pose()
         height, speed = 1.3 * self._config.lift.height_m, self._policy.speed_m_s
-        left = self._policy.trim_max_rad if self._strategy.trims else 0.0
+        left = self._policy.trim_max_rad if self._strategy.feels else 0.0
         reading = None
         while True:
             target = self._robot.pose()
@@ -324,18 +328,29 @@ class Attempt:
             if reading.arrived:
                 return None
 
-    def _raise(self, start: Float[np.ndarray, "4 4"], height_m: float) -> Reading:
+    def _raise(self, start: Float[np.ndarray, "4 4"], height_m: float) -> list[Reading]:
         target = start.copy()
         target[2, 3] += height_m
-        while True:
-            reading = self._robot.step(target, self._policy.speed_m_s)
-            if reading.arrived or not reading.followed:
-                return reading
+        readings = [self._robot.step(target, self._policy.speed_m_s)]
+        while not readings[-1].arrived and readings[-1].followed:
+            readings.append(self._robot.step(target, self._policy.speed_m_s))
+        return readings
 
     def _sampled(self, cloud: Cloud) -> Candidates:
         return sample_candidates(
             cloud,
             self._policy.candidates,
+            self._normal_radius_m,
+            self._policy.tilt_max_rad,
+            self._rng,
+        )
+
+    def _sampled_near(self, cloud: Cloud, place_m: Float[np.ndarray, " 3"]) -> Candidates:
+        return sample_near(
+            cloud,
+            place_m,
+            self._policy.regrasp_radius_m,
+            self._policy.local_candidates,
             self._normal_radius_m,
             self._policy.tilt_max_rad,
             self._rng,

@@ -198,7 +198,8 @@ def _facts(made: Attempt) -> str:
         f"**{made.policy}: {made.outcome}{': ' + made.cause if made.cause else ''}** "
         f"({made.scene_id}, attempt {made.attempt})\n\n"
         f"target {made.target or 'none'}; {made.candidates} candidates, "
-        f"{made.corrections} corrections; predicted q {made.predicted_quality:.3f}, "
+        f"{made.corrections} corrections, {made.regrasps} regrasps; "
+        f"predicted q {made.predicted_quality:.3f}, "
         f"reached q {made.reached_quality:.3f}, p {made.seal_pressure:.3f}; "
         f"lifted {1e3 * made.lifted_height_m:.0f} mm in {made.duration_s:.1f} s\n"
     )

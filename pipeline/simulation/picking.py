@@ -10,7 +10,8 @@ from jaxtyping import Float
 from pipeline.clutter.scene import ClutterScene
 from pipeline.config import RunConfig
 from pipeline.config.evaluation import PolicyName
-from pipeline.control.policy import Attempt, Cause, Decision, Strategy
+from pipeline.control.decision import Cause, Decision, Strategy
+from pipeline.control.policy import Attempt
 from pipeline.control.ranking import NetworkRanking, Predict, flattest_at_the_top
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.gripper.pad import build_pad
@@ -43,7 +44,7 @@ class Made:
 def strategy_of(name: PolicyName, predict: Predict, config: RunConfig) -> Strategy:
     """The policies that are compared.
 
-    closed-loop : several views, corrections, trimming. uncorrected : the same without
+    closed-loop : several views, corrections, and the wrench heeded. uncorrected : the same without
     corrections. open-loop : the pose that the network prefers on the first picture, executed.
     geometric : the flattest patch at the highest point of the first picture, executed.
     """
@@ -54,10 +55,10 @@ def strategy_of(name: PolicyName, predict: Predict, config: RunConfig) -> Strate
         config.evaluate.policy.smoothing_m,
     )
     if name == "geometric":
-        return Strategy(name, flattest_at_the_top, several_views=False, corrects=False, trims=False)
+        return Strategy(name, flattest_at_the_top, several_views=False, corrects=False, feels=False)
     closed = name == "closed-loop"
     views = name in ("closed-loop", "uncorrected")
-    return Strategy(name, network, several_views=views, corrects=closed, trims=closed)
+    return Strategy(name, network, several_views=views, corrects=closed, feels=closed)
 
 
 def mover_of(world: sapien.Scene, config: RunConfig) -> Mover:

@@ -104,3 +104,32 @@ class FakeRobot:
 
     def shake(self) -> Reading:
         return self.step(self._pose, 1.0)
+
+
+class HeavyRobot(FakeRobot):
+    """Its object hangs below a place; held with more than ``lever_m`` beside it, it breaks away."""
+
+    def __init__(
+        self, surface_m: float, centre_m: np.ndarray, lever_m: float, base_above_pad_m: float
+    ) -> None:
+        super().__init__(surface_m)
+        self.centre_m = centre_m
+        self.lever_m = lever_m
+        self.base = np.array([0.0, 0.0, base_above_pad_m, 1.0])
+        self.sealed_at: list[np.ndarray] = []
+
+    def step(self, world_from_gripper: np.ndarray, speed_m_s: float) -> Reading:
+        felt = super().step(world_from_gripper, speed_m_s)
+        if not self.sucks:
+            return felt
+        lever = self.centre_m - (felt.world_from_gripper @ self.base)[:3]
+        moment = felt.world_from_gripper[:3, :3].T @ np.cross(lever, [0.0, 0.0, -1.0])
+        breaks = bool(np.linalg.norm(self.sealed_at[-1][:2, 3] - self.centre_m[:2]) > self.lever_m)
+        self.sucks = not breaks
+        wrench = np.concatenate([felt.wrench[:3], moment])
+        return replace(felt, wrench=wrench, arrived=felt.arrived and not breaks)
+
+    def vacuum(self, on: bool) -> None:
+        super().vacuum(on)
+        if on:
+            self.sealed_at.append(self.pose())

@@ -9,9 +9,10 @@ import pytest
 from pipeline.config import EvaluateConfig
 from pipeline.control.candidates import Candidates
 from pipeline.control.cloud import DepthPicture
-from pipeline.control.policy import Attempt, Cause, Decision, Strategy
+from pipeline.control.decision import Cause, Decision, Strategy
+from pipeline.control.policy import Attempt
 from pipeline.control.robot import Reading, State
-from tests.control.fakes import FakeEyes, FakeRobot
+from tests.control.fakes import FakeEyes, FakeRobot, HeavyRobot
 
 CONFIG = EvaluateConfig()
 RADIUS_M = 0.01
@@ -30,8 +31,8 @@ def near_corner(_: Sequence[DepthPicture], candidates: Candidates) -> np.ndarray
     return np.asarray(0.5 + 5 * place.sum(axis=1))
 
 
-CLOSED = Strategy("closed-loop", near_corner, several_views=True, corrects=True, trims=True)
-OPEN = replace(CLOSED, several_views=False, corrects=False, trims=False)
+CLOSED = Strategy("closed-loop", near_corner, several_views=True, corrects=True, feels=True)
+OPEN = replace(CLOSED, several_views=False, corrects=False, feels=False)
 
 
 def tried(
@@ -206,3 +207,33 @@ def test_a_place_that_looks_bad_from_near_is_left_for_another() -> None:
     decision, _ = tried(points, robot, replace(CLOSED, ranking=deceived))
     assert decision.cause is Cause.LIFTED
     assert decision.world_from_contact[0, 3] > 0.15
+
+
+def heavy(lever_m: float) -> HeavyRobot:
+    return HeavyRobot(TOP_M, np.array([-0.01, 0.0, 0.02]), lever_m, CONFIG.hand.length_m)
+
+
+def test_what_broke_away_askew_is_grasped_nearer_to_where_it_hangs() -> None:
+    """All that is seen says: the corner. The tug says where the weight is."""
+    robot = heavy(lever_m=0.02)
+    decision, _ = tried(plate(), robot)
+    assert decision.cause is Cause.LIFTED
+    assert 1 <= decision.regrasps <= CONFIG.policy.regrasps
+    first, last = (np.linalg.norm(p[:2, 3] - robot.centre_m[:2]) for p in robot.sealed_at[:2])
+    assert last < 0.7 * first
+    assert robot.states.count(State.SEAL) == 1 + decision.regrasps
+
+
+def test_without_the_wrench_it_is_a_failure() -> None:
+    robot = heavy(lever_m=0.02)
+    decision, _ = tried(plate(), robot, replace(CLOSED, feels=False))
+    assert decision.cause is Cause.NO_SEAL
+    assert decision.regrasps == 0
+    assert robot.states.count(State.SEAL) == 1
+
+
+def test_regrasps_end() -> None:
+    robot = heavy(lever_m=0.0)
+    decision, _ = tried(plate(), robot)
+    assert decision.cause is Cause.NO_SEAL
+    assert decision.regrasps <= CONFIG.policy.regrasps

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pipeline.config import RunConfig
-from pipeline.control.policy import Cause
+from pipeline.control.decision import Cause
 from pipeline.control.ranking import Predict
 from pipeline.simulation.picking import Clutter, strategy_of
 from pipeline.simulation.scenarios import SCENARIOS, trials

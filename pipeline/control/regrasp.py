@@ -1,0 +1,57 @@
+"""What hung askew and broke away: where it hangs from, felt at the base, and contacts nearer to it.
+
+Supplement VI: the wrench serves to «minimize the moments on the gripper base during grasping». A
+pad bears far less moment than pull, so what is heavy must be held near its centre of mass, which
+no picture shows; a first tug does.
+"""
+
+import numpy as np
+from jaxtyping import Float
+
+from pipeline.control.candidates import Candidates
+from pipeline.control.cloud import Cloud
+from pipeline.control.robot import Reading
+from pipeline.control.wrench_monitor import line_of_load
+
+_COLUMN_M = 0.02  # what is this near to a vertical line is on it
+_NEARER = 0.7  # a new contact has at most this share of the old lever
+
+
+def hangs_below_m(felt: Reading, base_above_pad_m: float) -> Float[np.ndarray, " 2"]:
+    """Horizontal place in WCS of the line on which the load's weight acts: its centre of mass.
+
+    The line of action of the force at the base, followed to the height of the pad.
+    """
+    pose = felt.world_from_gripper
+    on_line = np.array([0.0, 0.0, base_above_pad_m]) + line_of_load(felt.wrench)
+    point = pose[:3, :3] @ on_line + pose[:3, 3]
+    pull = pose[:3, :3] @ felt.wrench[:3]
+    along = (pose[2, 3] - point[2]) / pull[2]
+    return np.asarray(point[:2] + along * pull[:2])
+
+
+def top_of_column_m(
+    cloud: Cloud, place_m: Float[np.ndarray, " 2"]
+) -> Float[np.ndarray, " 3"] | None:
+    """The highest point measured over a place on the table; None where there is none."""
+    near = np.linalg.norm(cloud.points_m[:, :2] - place_m, axis=1) <= _COLUMN_M
+    if not near.any():
+        return None
+    column = cloud.points_m[near]
+    return np.asarray(column[np.argmax(column[:, 2])])
+
+
+def worth_with_lever(
+    quality: Float[np.ndarray, " k"],
+    candidates: Candidates,
+    place_m: Float[np.ndarray, " 2"],
+    lever_m: float,
+    radius_m: float,
+) -> Float[np.ndarray, " k"]:
+    """q-hat, less the farther the contact is from where the load hangs; 0 where that gains little.
+
+    lever_m : horizontal lever of the contact that did not hold. radius_m : r_G; the moment that a
+    pad bears grows with it.
+    """
+    aside = np.linalg.norm(candidates.world_from_contact[:, :2, 3] - place_m, axis=1)
+    return np.where(aside <= _NEARER * lever_m, quality * np.exp(-((aside / radius_m) ** 2)), 0.0)
