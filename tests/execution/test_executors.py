@@ -49,6 +49,15 @@ def test_a_worker_killed_while_the_next_one_starts(pause_s: float) -> None:
     assert not multiprocessing.active_children()
 
 
+@pytest.fixture
+def hears_interrupts() -> Iterator[None]:
+    """As from a terminal; what a shell starts in the background is born deaf to SIGINT."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("hears_interrupts")
 def test_workers_are_deaf_to_interrupts_from_their_first_moment() -> None:
     """A terminal sends SIGINT to all; a worker whose interpreter starts would die of it."""
 
@@ -62,6 +71,7 @@ def test_workers_are_deaf_to_interrupts_from_their_first_moment() -> None:
     assert list(run_in_order(square, items(), 2)) == [x * x for x in range(6)]
 
 
+@pytest.mark.usefixtures("hears_interrupts")
 def test_the_driver_hears_an_interrupt_that_came_while_a_worker_started() -> None:
     def items() -> Iterator[int]:
         yield 1
