@@ -86,9 +86,7 @@ def finish_object(
     rng: draws the target extent alone. cache_dir: where convex parts are kept. NSVR is the
     measured one: rescaling does not change it.
     """
-    target = float(measured.mesh.extents_m.max())
-    if config.rescaled:
-        target = draw_target_extent(config, rng)
+    target = _target_extent_m(measured.mesh, config, rng)
     scaled, scale = rescale(measured.mesh, target)
     centre = mass_properties(scaled, config.density_kg_m3).centre_of_mass_m
     mesh = Mesh(scaled.vertices_m - centre, scaled.faces)
@@ -129,9 +127,7 @@ def stretched_copy(
     """
     stretch = draw_stretch(config, rng)
     stretched = Mesh(item.mesh.vertices_m * stretch, item.mesh.faces)
-    target = float(stretched.extents_m.max())
-    if config.rescaled:
-        target = draw_target_extent(config, rng)
+    target = _target_extent_m(stretched, config, rng)
     mesh, scale = rescale(stretched, target)
     parts = [Mesh(part.vertices_m * (scale * stretch), part.faces) for part in item.convex_parts]
     mass = mass_properties(mesh, config.density_kg_m3)
@@ -152,6 +148,13 @@ def stretched_copy(
         mesh=mesh,
         convex_parts=tuple(parts),
     )
+
+
+def _target_extent_m(mesh: Mesh, config: ObjectsConfig, rng: np.random.Generator) -> float:
+    """Longest extent to rescale to: drawn, or the mesh's own where nothing is rescaled."""
+    if config.rescaled:
+        return draw_target_extent(config, rng)
+    return float(mesh.extents_m.max())
 
 
 def material_of(name: str, config: ObjectsConfig) -> Material:
