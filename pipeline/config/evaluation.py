@@ -91,10 +91,13 @@ class PolicyConfig(Section):
         0.1, ge=0, le=1, description="rise of q-hat that a correction must promise [1]"
     )
     regrasps: int = Field(
-        2, ge=0, description="how often what broke away in the tug is grasped nearer to its centre"
+        2, ge=0, description="how often an attempt grasps elsewhere what did not hold in the tug"
+    )
+    regrasp_quality: float = Field(
+        0.1, ge=0, le=1, description="least q-hat of another place after a seal that failed [1]"
     )
     regrasp_lever_m: float = Field(
-        0.015, ge=0, description="a lever felt in the tug that is worth a regrasp [m]"
+        0.015, ge=0, description="lever felt in the tug from which the centre is aimed at [m]"
     )
     regrasp_radius_m: float = Field(
         0.025, gt=0, description="how near to the load's centre a regrasp is sought [m]"
@@ -129,6 +132,9 @@ class EvaluateConfig(Section):
     """Closed-loop evaluation on the test clutters."""
 
     robot: RobotName = Field("floating", description="a gripper alone, or on a KUKA LBR iiwa 14")
+    segmentation: Literal["none", "ideal"] = Field(
+        "none", description="what tells objects apart by colour; 'ideal': the truth, pixel by pixel"
+    )
     policies: tuple[PolicyName, ...] = Field(
         ("closed-loop", "open-loop", "geometric"), min_length=1, description="the first is judged"
     )

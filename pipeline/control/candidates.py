@@ -35,10 +35,15 @@ class Candidates:
         return Candidates(self.world_from_contact[chosen], self.roughness_m[chosen])
 
 
+_NONE = Candidates(np.empty((0, 4, 4)), np.empty(0))
+
+
 def sample_candidates(
     cloud: Cloud, count: int, radius_m: float, tilt_max_rad: float, rng: np.random.Generator
 ) -> Candidates:
     """u contacts at random on the cloud; fewer where surfaces are too steep or too small."""
+    if len(cloud) == 0:
+        return _NONE
     at = rng.integers(len(cloud), size=count)
     return candidates_at(cloud, cloud.points_m[at], cloud.eye_m[at], radius_m, tilt_max_rad)
 
@@ -55,7 +60,7 @@ def sample_near(
     """The contact itself, first, and others at random near it, for corrections on the way down."""
     near = np.flatnonzero(np.linalg.norm(cloud.points_m - contact_m, axis=1) <= within_m)
     if len(near) == 0:
-        return Candidates(np.empty((0, 4, 4)), np.empty(0))
+        return _NONE
     nearest = near[np.argmin(np.linalg.norm(cloud.points_m[near] - contact_m, axis=1))]
     at = np.concatenate([[nearest], rng.choice(near, size=count - 1)])
     return candidates_at(cloud, cloud.points_m[at], cloud.eye_m[at], radius_m, tilt_max_rad)
@@ -76,7 +81,7 @@ def candidates_at(
     count, mean, scatter = _neighbourhoods(cloud.points_m, contacts_m, radius_m)
     enough = count >= _FEWEST_POINTS
     if not enough.any():
-        return Candidates(np.empty((0, 4, 4)), np.empty(0))
+        return _NONE
     contacts, eyes, mean = contacts_m[enough], eyes_m[enough], mean[enough]
     squared, axes = np.linalg.eigh(scatter[enough])
     normals = axes[:, :, 0]

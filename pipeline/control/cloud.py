@@ -24,10 +24,13 @@ class DepthPicture:
     """A depth image and the camera that took it, with its pose in WCS.
 
     depth_m : (h, w); what is not above zero, NaN included, was not measured.
+    instances : which object each pixel shows by its colour, 0 for none; None where nothing
+        segments the pictures.
     """
 
     depth_m: Float[np.ndarray, "h w"]
     camera: PinholeCamera
+    instances: Int[np.ndarray, "h w"] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +63,17 @@ def merged_cloud(pictures: Sequence[DepthPicture], voxel_m: float = VOXEL_M) -> 
         [np.bincount(owner, weights=points[:, axis]) / counts for axis in range(3)], axis=1
     )
     return Cloud(means, eyes[first])
+
+
+def heights_m(picture: DepthPicture) -> Float[np.ndarray, "h w"]:
+    """Height above the table of what each pixel measured; NaN where nothing was."""
+    pose, k = picture.camera.world_from_camera, picture.camera.intrinsics
+    height, width = picture.depth_m.shape
+    x = (np.arange(width) + 0.5 - k[0, 2]) / k[0, 0]
+    y = (np.arange(height) + 0.5 - k[1, 2]) / k[1, 1]
+    slope = pose[2, 0] * x[None] + pose[2, 1] * y[:, None] + pose[2, 2]
+    depth = np.where(picture.depth_m > 0, picture.depth_m, np.nan)
+    return np.asarray(depth * slope + pose[2, 3])
 
 
 def _measured(picture: DepthPicture) -> Cloud:

@@ -32,8 +32,8 @@ class Strategy:
     """How attempts are made.
 
     several_views : whether the wrist looks before the choice. corrects : whether it looks again
-    on the way down. feels : whether the wrench lessens moments: by a grasp nearer to the load's
-    centre after a first tug, and by trimming the lift.
+    on the way down. feels : whether the wrench is heeded: what the first tug shows not to hold is
+    grasped elsewhere, nearer to the load's centre where one is felt, and the lift is trimmed.
     """
 
     name: PolicyName
@@ -45,7 +45,10 @@ class Strategy:
 
 @dataclass(eq=False)
 class Decision:
-    """How an attempt went, as far as the policy knows; filled in as it goes."""
+    """How an attempt went, as far as the policy knows; filled in as it goes.
+
+    spoilt_m : contacts that did not hold in the first tug.
+    """
 
     cause: Cause = Cause.EMPTY_CLOUD
     candidates: Float[np.ndarray, "k 4 4"] = field(default_factory=lambda: np.empty((0, 4, 4)))
@@ -54,4 +57,5 @@ class Decision:
     world_from_contact: Float[np.ndarray, "4 4"] = field(default_factory=lambda: np.eye(4))
     corrections: int = 0
     regrasps: int = 0
+    spoilt_m: list[Float[np.ndarray, " 3"]] = field(default_factory=list)
     pictures: list[DepthPicture] = field(default_factory=list)

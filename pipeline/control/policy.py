@@ -3,9 +3,11 @@
 Global phase: clouds of several viewpoints are merged, u candidates sampled and ranked in one
 batch; those the robot cannot reach or that would collide are left out. Local phase: the wrist's
 camera looks again at every control step, and the contact is corrected, until the camera is too
-near; then straight on until contact. After that the wrench leads (Supplement VI): what hung askew
-and broke away in the first tug is grasped once more, nearer to its centre. What is needed of the
-world is in `pipeline.control.robot`; each way to end is in `pipeline.control.decision`.
+near; then straight on until contact. After that the wrench leads (Supplement VI): what the first
+tug shows not to hold is grasped once more, nearer to its centre where it hung askew and broke away,
+at the next best place where nothing hung at all. What colour shows and depth does not is felt for,
+straight down, where nothing better is left. What is needed of the world is in
+`pipeline.control.robot`; each way to end is in `pipeline.control.decision`.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,21 +16,18 @@ import numpy as np
 from jaxtyping import Float
 
 from pipeline.config.evaluation import EvaluateConfig
-from pipeline.control.candidates import Candidates, sample_candidates, sample_near
-from pipeline.control.clearance import free_of_collision
-from pipeline.control.cloud import Cloud, DepthPicture, merged_cloud
 from pipeline.control.correction import LOOK_M
 from pipeline.control.decision import Cause, Decision, Strategy
+from pipeline.control.global_phase import Choice, GlobalPhase
 from pipeline.control.local_phase import LocalPhase, way_left_m
-from pipeline.control.regrasp import hangs_below_m, top_of_column_m, worth_with_lever
+from pipeline.control.regrasp import hangs_below_m
 from pipeline.control.robot import Eyes, Reading, Robot, State
-from pipeline.control.viewpoints import best_apart, facing, gripper_above
+from pipeline.control.viewpoints import backed_off, facing
 from pipeline.control.wrench_monitor import Event, WrenchMonitor, hanging_n, trimmed
 
 _SEARCH_M = 0.06  # past the expected contact the pad goes on at most this far
 _RETREAT_M = 0.05
 _TUG_M = 0.01  # the first bit of the lift, in which a seal shows its pull
-_APART_M = 0.03  # another place to grasp, not the same once more
 _TRIM_FROM_M = 0.03  # clear of the neighbours
 
 Phase = tuple[State, Callable[[], Cause | None]]
@@ -53,16 +52,13 @@ class Attempt:
         self._strategy = strategy
         self._config = config
         self._policy = config.policy
-        self._normal_radius_m = normal_radius_m
-        self._rng = rng
-        self._avoid_m = avoid_m
         self._monitor = WrenchMonitor(config.policy)
-        self._ranked: list[tuple[float, Float[np.ndarray, "4 4"]]] = []
-        self._rejected_m: list[Float[np.ndarray, " 3"]] = []
+        self._global = GlobalPhase(eyes, robot, strategy, config, normal_radius_m, rng, avoid_m)
         self._local = LocalPhase(strategy.ranking, config, normal_radius_m, rng)
         self._new_choices_left = config.policy.new_choices
         self._retargets_left = config.policy.retargets if strategy.corrects else 0
         self._regrasps_left = config.policy.regrasps if strategy.feels else 0
+        self._felt_for = False
         self.decision = Decision()
 
     def run(self) -> Decision:
@@ -98,80 +94,20 @@ class Attempt:
         return self._choose_from(several_views=self._strategy.several_views)
 
     def _choose_from(self, several_views: bool) -> Cause | None:
-        pictures = self._eyes.static()
-        if pictures is None:
-            return Cause.CAMERA_STOPPED
-        cloud = merged_cloud(pictures)
-        if len(cloud) == 0:
-            return Cause.EMPTY_CLOUD
-        if several_views:
-            more = self._look_closer(pictures, cloud)
-            if isinstance(more, Cause):
-                return more
-            pictures = [*pictures, *more]
-            cloud = merged_cloud(pictures)
-        self.decision.pictures = pictures
-        found = self._unspoilt(self._sampled(cloud))
-        if len(found) == 0:
-            return Cause.NO_CANDIDATE
-        quality = self._strategy.ranking(pictures, found)
-        self.decision.candidates, self.decision.quality = found.world_from_contact, quality
-        poses = found.world_from_contact
-        free = free_of_collision(poses, cloud.points_m, self._config.hand)
-        if not free.any():
-            return Cause.NO_CANDIDATE
-        order = np.argsort(-quality, kind="stable")
-        self._ranked = [(float(quality[i]), poses[i]) for i in order if free[i]]
-        if self._next_best(least=0.0):
-            return None
-        return Cause.UNREACHABLE
-
-    def _look_closer(
-        self, pictures: Sequence[DepthPicture], cloud: Cloud
-    ) -> list[DepthPicture] | Cause:
-        """Pictures of the wrist's camera above the most promising places."""
-        found = self._unspoilt(self._sampled(cloud))
-        if len(found) == 0:
-            return []
-        quality = self._strategy.ranking(pictures, found)
-        places = found.world_from_contact[:, :3, 3]
-        more = []
-        for place in best_apart(places, quality, self._policy.wrist_views):
-            pose = gripper_above(place, self._policy.wrist_view_m, self._robot.pose())
-            if not self._robot.reachable(pose):
-                continue
-            if self._travel(pose) is not None:
-                continue  # something is in the way: look from where others are
-            picture = self._eyes.wrist(place, self._policy.wrist_view_m / 2)
-            if picture is None:
-                return Cause.CAMERA_STOPPED
-            more.append(picture)
-        return more
-
-    def _next_best(self, least: float) -> bool:
-        """Aim at the best of what is left that promises at least so much and can be reached."""
-        for quality, pose in self._ranked:
-            if quality < least:
-                break
-            distance = [np.linalg.norm(pose[:3, 3] - aim) for aim in self._rejected_m]
-            if min(distance, default=np.inf) < _APART_M:
-                continue
-            if self._can_reach(facing(pose, self._robot.pose())):
-                self._aim(pose, quality)
-                return True
-        return False
+        cause = self._global.look(self.decision, self._travel if several_views else None)
+        if cause is not None:
+            return cause
+        return None if self._aims_at(self._global.best(least=0.0)) else Cause.UNREACHABLE
 
     def _retargeted(self) -> bool:
         """Whether, seen from near, the aim promises clearly less than another; then aim there."""
         if self._retargets_left == 0:
             return False
-        decision = self.decision
-        self._rejected_m.append(decision.world_from_contact[:3, 3])
-        if self._next_best(decision.predicted_quality + self._policy.retarget_gain):
-            self._retargets_left -= 1
-            return True
-        self._rejected_m.pop()
-        return False
+        wanted = self.decision.predicted_quality + self._policy.retarget_gain
+        if not self._aims_at(self._global.better_than(self.decision.world_from_contact, wanted)):
+            return False
+        self._retargets_left -= 1
+        return True
 
     def _go_above(self) -> Cause | None:
         return self._travel(backed_off(self.decision.world_from_contact, self._policy.standoff_m))
@@ -184,17 +120,16 @@ class Attempt:
         for _ in range(round(self._policy.approach_max_s * self._policy.rate_hz)):
             aim = self.decision.world_from_contact
             here = self._robot.pose()
-            if self._strategy.corrects and self._sees(aim, here):
+            if self._strategy.corrects and not self._felt_for and self._sees(aim, here):
                 cause = self._correct()
                 if cause is None and self._retargeted():
-                    self._local.start_over()
                     cause = self._go_above()
                 if cause is not None:
                     return cause
                 aim = self.decision.world_from_contact
             if self._local.moves and not self._robot.reachable(aim):
                 return Cause.UNREACHABLE
-            ahead = backed_off(self._local.met(aim, here), -_SEARCH_M)
+            ahead = backed_off(self._local.met(aim, here), -self._search_m())
             reading = self._robot.step(ahead, self._policy.speed_m_s)
             self.decision.world_from_contact = self._local.passed_on(aim)
             event = self._monitor.moving(reading)
@@ -207,8 +142,14 @@ class Attempt:
                 return None
             if reading.arrived:
                 break
-        self._travel(backed_off(self._robot.pose(), _RETREAT_M + _SEARCH_M))
+        self._travel(backed_off(self._robot.pose(), _RETREAT_M + self._search_m()))
         return Cause.NO_CONTACT
+
+    def _search_m(self) -> float:
+        """How far past the expected contact the pad goes on; feeling for it, down to the table."""
+        if not self._felt_for:
+            return _SEARCH_M
+        return _SEARCH_M + float(self.decision.world_from_contact[2, 3])
 
     def _sees(self, aim: Float[np.ndarray, "4 4"], here: Float[np.ndarray, "4 4"]) -> bool:
         """Whether the aim is not too near: for the wrist's camera, or to go elsewhere."""
@@ -238,7 +179,6 @@ class Attempt:
         Where that finds nothing either, the aim stays.
         """
         self._new_choices_left -= 1
-        self._local.start_over()
         cause = self._choose_from(several_views=False)
         if cause is None:
             return self._go_above()
@@ -248,6 +188,7 @@ class Attempt:
         """Vacuum on, and the first bit of the lift: a held object pulls.
 
         What pulled and broke away was held too far from its centre of mass: nearer, once more.
+        Where nothing pulls the seal is bad: elsewhere, once more.
         """
         self._robot.vacuum(on=True)
         start = self._robot.pose()
@@ -256,7 +197,10 @@ class Attempt:
             return None
         self._robot.vacuum(on=False)
         self._travel(backed_off(start, _RETREAT_M))
-        if self._regrasps_left == 0 or not self._aims_nearer(max(readings, key=hanging_n)):
+        self.decision.spoilt_m.append(self.decision.world_from_contact[:3, 3])
+        if self._regrasps_left == 0:
+            return Cause.NO_SEAL
+        if not (self._aims_nearer(max(readings, key=hanging_n)) or self._aims_elsewhere()):
             return Cause.NO_SEAL
         self._regrasps_left -= 1
         self.decision.regrasps += 1
@@ -270,26 +214,15 @@ class Attempt:
         lever_m = float(np.linalg.norm(place - felt.world_from_gripper[:2, 3]))
         if lever_m < self._policy.regrasp_lever_m:
             return False  # it is the seal that is weak
-        cloud = merged_cloud(self.decision.pictures)
-        top = top_of_column_m(cloud, place)
-        if top is None:
+        if not self._aims_at(self._global.nearer_to(place, lever_m, self.decision.pictures)):
             return False
-        found = self._unspoilt(self._sampled_near(cloud, top))
-        found = found.take(
-            free_of_collision(found.world_from_contact, cloud.points_m, self._config.hand)
-        )
-        if len(found) == 0:
-            return False
-        quality = self._strategy.ranking(self.decision.pictures, found)
-        worth = worth_with_lever(quality, found, place, lever_m, self._policy.regrasp_radius_m)
-        self._local.start_over()
         self._retargets_left = 0  # what is felt outweighs what is seen
-        self._ranked = [
-            (float(quality[i]), found.world_from_contact[i])
-            for i in np.argsort(-worth, kind="stable")
-            if worth[i] > 0.0
-        ]
-        return self._next_best(least=0.0)
+        return True
+
+    def _aims_elsewhere(self) -> bool:
+        """Whether a place is left that promises enough; then aim there."""
+        self._global.reject(self.decision.world_from_contact)
+        return self._aims_at(self._global.best(self._policy.regrasp_quality))
 
     def _lift(self) -> Cause | None:
         """Up, trimming the pose to lessen moments at the base; slower after a slip."""
@@ -336,47 +269,14 @@ class Attempt:
             readings.append(self._robot.step(target, self._policy.speed_m_s))
         return readings
 
-    def _sampled(self, cloud: Cloud) -> Candidates:
-        return sample_candidates(
-            cloud,
-            self._policy.candidates,
-            self._normal_radius_m,
-            self._policy.tilt_max_rad,
-            self._rng,
-        )
-
-    def _sampled_near(self, cloud: Cloud, place_m: Float[np.ndarray, " 3"]) -> Candidates:
-        return sample_near(
-            cloud,
-            place_m,
-            self._policy.regrasp_radius_m,
-            self._policy.local_candidates,
-            self._normal_radius_m,
-            self._policy.tilt_max_rad,
-            self._rng,
-        )
-
-    def _unspoilt(self, found: Candidates) -> Candidates:
-        """Without those too near to a contact that failed before."""
-        keep = np.ones(len(found), dtype=bool)
-        for contact in self._avoid_m:
-            distance = np.linalg.norm(found.world_from_contact[:, :3, 3] - contact, axis=1)
-            keep &= distance > self._policy.avoid_radius_m
-        return found.take(keep)
-
-    def _can_reach(self, contact: Float[np.ndarray, "4 4"]) -> bool:
-        above = backed_off(contact, self._policy.standoff_m)
-        return self._robot.reachable(above) and self._robot.reachable(contact)
+    def _aims_at(self, choice: Choice | None) -> bool:
+        if choice is None:
+            return False
+        self._aim(choice.world_from_contact, choice.quality)
+        self._felt_for = choice.felt_for
+        self._local.start_over()
+        return True
 
     def _aim(self, pose: Float[np.ndarray, "4 4"], quality: float) -> None:
         self.decision.world_from_contact = facing(pose, self._robot.pose())
         self.decision.predicted_quality = float(quality)
-
-
-def backed_off(
-    world_from_contact: Float[np.ndarray, "4 4"], distance_m: float
-) -> Float[np.ndarray, "4 4"]:
-    """The pose out along its approach."""
-    pose = world_from_contact.copy()
-    pose[:3, 3] += distance_m * pose[:3, 2]
-    return pose

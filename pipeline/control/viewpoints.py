@@ -1,4 +1,4 @@
-"""Where the wrist looks from before a choice is made, and how it is turned about its axis."""
+"""Poses of the gripper: where the wrist looks from, how it turns, where an approach begins."""
 
 import numpy as np
 from jaxtyping import Float
@@ -32,6 +32,11 @@ def gripper_above(
     return pose
 
 
+def turned_about(world_from_gripper: Float[np.ndarray, "4 4"]) -> Float[np.ndarray, "4 4"]:
+    """The pose turned by half a turn about its approach: the wrist's camera looks from opposite."""
+    return world_from_gripper * np.array([-1.0, -1.0, 1.0, 1.0])
+
+
 def facing(
     world_from_contact: Float[np.ndarray, "4 4"], before: Float[np.ndarray, "4 4"]
 ) -> Float[np.ndarray, "4 4"]:
@@ -47,4 +52,13 @@ def facing(
     pose = world_from_contact.copy()
     pose[:3, 0] = x / length
     pose[:3, 1] = np.cross(z, pose[:3, 0])
+    return pose
+
+
+def backed_off(
+    world_from_contact: Float[np.ndarray, "4 4"], distance_m: float
+) -> Float[np.ndarray, "4 4"]:
+    """The pose out along its approach."""
+    pose = world_from_contact.copy()
+    pose[:3, 3] += distance_m * pose[:3, 2]
     return pose

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numba
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from pipeline.geometry.posed_bodies import PosedScene
 from pipeline.geometry.transforms import invert, transform_points
@@ -32,6 +32,11 @@ def measured_depth(
     if opaque is not None:
         view = replace(view, behind_m=_exact(camera, opaque).depth_m)
     return view.depth_m if rng is None else disturb(view, rng)
+
+
+def instances(camera: PinholeCamera, scene: PosedScene) -> Int[np.ndarray, "h w"]:
+    """The body that each pixel shows, transparent or not; 0 for the table and for nothing."""
+    return _exact(camera, scene).segmentation
 
 
 def window_around(

@@ -171,9 +171,11 @@ def run_clutter(
     ):
         made = clutter.attempted(strategy, spoilt_m)
         attempts.append(made)
+        # What did not hold once is not tried again, whatever is lifted in between.
+        spoilt_m += made.decision.spoilt_m
         if made.cause is Cause.LIFTED:
             in_a_row = 0
-        else:  # what did not hold once is not tried again, whatever is lifted in between
+        else:
             in_a_row += 1
             spoilt_m.append(made.decision.world_from_contact[:3, 3])
     return attempts

@@ -26,7 +26,7 @@ class Scenario:
     """What lies on the table, and how fast it passes.
 
     sides_m : of each box. gap_m : between two boxes that stand side by side along their y.
-    speed_m_s : along world x, as on a conveyor.
+    speed_m_s : along world x, as on a conveyor. segmented : whether objects are told by colour.
     """
 
     name: str
@@ -35,6 +35,7 @@ class Scenario:
     gap_m: float = 0.0
     material: Material = "opaque"
     speed_m_s: float = 0.0
+    segmented: bool = False
 
 
 _PLAIN = (0.07, 0.07, 0.04)
@@ -42,6 +43,7 @@ _SLIM = (0.14, 0.024, 0.03)
 SCENARIOS = (
     Scenario("plain", _PLAIN),
     Scenario("transparent", _PLAIN, material="transparent"),
+    Scenario("transparent, segmented", _PLAIN, material="transparent", segmented=True),
     Scenario("flush neighbours", (0.06, 0.06, 0.04), count=2, gap_m=0.0005),
     Scenario("slim, alone", _SLIM),
     Scenario("slim, side by side", _SLIM, count=2, gap_m=0.004),

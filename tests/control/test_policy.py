@@ -237,3 +237,42 @@ def test_regrasps_end() -> None:
     decision, _ = tried(plate(), robot)
     assert decision.cause is Cause.NO_SEAL
     assert decision.regrasps <= CONFIG.policy.regrasps
+
+
+class LeakyRobot(FakeRobot):
+    """The first place that is tried has a hole."""
+
+    def __init__(self, surface_m: float) -> None:
+        super().__init__(surface_m)
+        self.sealed_at: list[np.ndarray] = []
+
+    def vacuum(self, on: bool) -> None:
+        if on:
+            self.sealed_at.append(self.pose()[:3, 3])
+        leaks = np.linalg.norm(self.pose()[:3, 3] - self.sealed_at[0]) < 0.025
+        super().vacuum(on and not leaks)
+
+
+def test_where_nothing_holds_another_place_is_grasped_in_the_same_attempt() -> None:
+    robot = LeakyRobot(TOP_M)
+    decision, eyes = tried(plate(), robot)
+    assert decision.cause is Cause.LIFTED
+    assert decision.regrasps == len(decision.spoilt_m) == 1
+    assert eyes.static_looks == 1
+    np.testing.assert_allclose(decision.spoilt_m[0][:2], robot.sealed_at[0][:2], atol=2e-3)
+
+
+def test_every_place_that_did_not_hold_is_told() -> None:
+    robot = FakeRobot(TOP_M, State.SEAL)
+    decision, _ = tried(plate(), robot)
+    assert decision.cause is Cause.NO_SEAL
+    assert len(decision.spoilt_m) == 1 + decision.regrasps == 1 + CONFIG.policy.regrasps
+
+
+def test_what_promises_nothing_is_no_second_try() -> None:
+    def promises(_: Sequence[DepthPicture], candidates: Candidates) -> np.ndarray:
+        return np.full(len(candidates), 0.5 * CONFIG.policy.regrasp_quality)
+
+    decision, _ = tried(plate(), FakeRobot(TOP_M, State.SEAL), replace(CLOSED, ranking=promises))
+    assert decision.cause is Cause.NO_SEAL
+    assert decision.regrasps == 0

@@ -1,0 +1,221 @@
+"""The global phase: look from several viewpoints, sample contacts, rank them, take the best.
+
+What colour shows and depth does not is ranked below all that was measured: it can only be felt for.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from pipeline.config.evaluation import EvaluateConfig
+from pipeline.control.candidates import Candidates, sample_candidates, sample_near
+from pipeline.control.clearance import free_of_collision
+from pipeline.control.cloud import Cloud, DepthPicture, merged_cloud
+from pipeline.control.decision import Cause, Decision, Strategy
+from pipeline.control.regrasp import top_of_column_m, worth_with_lever
+from pipeline.control.robot import Eyes, Robot
+from pipeline.control.unseen import unseen_contacts
+from pipeline.control.viewpoints import (
+    backed_off,
+    best_apart,
+    facing,
+    gripper_above,
+    turned_about,
+)
+
+_APART_M = 0.03  # another place to grasp, not the same once more
+
+Pose = Float[np.ndarray, "4 4"]
+Travel = Callable[[Pose], Cause | None]
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """A contact that may be aimed at, its q-hat, and whether it must be felt for, unmeasured."""
+
+    world_from_contact: Pose
+    quality: float
+    felt_for: bool = False
+
+
+class GlobalPhase:
+    """What there is to aim at, the best first, as it was last seen."""
+
+    def __init__(
+        self,
+        eyes: Eyes,
+        robot: Robot,
+        strategy: Strategy,
+        config: EvaluateConfig,
+        normal_radius_m: float,
+        rng: np.random.Generator,
+        avoid_m: Sequence[Float[np.ndarray, " 3"]],
+    ) -> None:
+        """avoid_m : contacts that failed before, not to be tried again."""
+        self._eyes = eyes
+        self._robot = robot
+        self._ranking = strategy.ranking
+        self._config = config
+        self._policy = config.policy
+        self._normal_radius_m = normal_radius_m
+        self._rng = rng
+        self._avoid_m = avoid_m
+        self._rejected_m: list[Float[np.ndarray, " 3"]] = []
+        self._ranked: list[Choice] = []
+
+    def look(self, decision: Decision, travel: Travel | None) -> Cause | None:
+        """Rank all that is seen; what is seen and ranked is noted in the decision.
+
+        travel : brings the wrist's camera above what is promising; None: only what stands beside
+        the table looks.
+        """
+        pictures = self._eyes.static()
+        if pictures is None:
+            return Cause.CAMERA_STOPPED
+        if travel is not None:
+            more = self._look_closer(pictures, travel)
+            if isinstance(more, Cause):
+                return more
+            pictures = [*pictures, *more]
+        cloud, unseen = merged_cloud(pictures), unseen_contacts(pictures)
+        if len(cloud) == 0 and len(unseen) == 0:
+            return Cause.EMPTY_CLOUD
+        decision.pictures = pictures
+        found = self._unspoilt(self._sampled(cloud))
+        quality = self._ranking(pictures, found) if len(found) else np.empty(0)
+        decision.candidates, decision.quality = found.world_from_contact, quality
+        self._ranked = [
+            *self._free(cloud, found, quality, best_first=quality),
+            *(Choice(pose, 0.0, felt_for=True) for pose in unseen if self._fresh(pose[:3, 3])),
+        ]
+        return None if self._ranked else Cause.NO_CANDIDATE
+
+    def best(self, least: float) -> Choice | None:
+        """The best of what is left that promises at least so much and can be reached."""
+        for choice in self._ranked:
+            if choice.quality < least:
+                return None
+            place = choice.world_from_contact[:3, 3]
+            distance = [np.linalg.norm(place - aim) for aim in self._rejected_m]
+            if min(distance, default=np.inf) < _APART_M:
+                continue
+            if self._can_reach(facing(choice.world_from_contact, self._robot.pose())):
+                return choice
+        return None
+
+    def better_than(self, aim: Pose, quality: float) -> Choice | None:
+        """A place elsewhere that promises at least so much; the aim is then rejected."""
+        self._rejected_m.append(aim[:3, 3])
+        choice = self.best(quality)
+        if choice is None:
+            self._rejected_m.pop()
+        return choice
+
+    def reject(self, aim: Pose) -> None:
+        """Nothing so near to this contact is to be aimed at again."""
+        self._rejected_m.append(aim[:3, 3])
+
+    def nearer_to(
+        self,
+        place_m: Float[np.ndarray, " 2"],
+        lever_m: float,
+        pictures: Sequence[DepthPicture],
+    ) -> Choice | None:
+        """A contact nearer to the line on which a load hangs; what else was ranked is forgotten.
+
+        lever_m : horizontal lever of the contact that did not hold.
+        """
+        cloud = merged_cloud(pictures)
+        top = top_of_column_m(cloud, place_m)
+        if top is None:
+            return None
+        found = self._unspoilt(self._sampled_near(cloud, top))
+        if len(found) == 0:
+            return None
+        quality = self._ranking(pictures, found)
+        worth = worth_with_lever(quality, found, place_m, lever_m, self._policy.regrasp_radius_m)
+        nearer = worth > 0.0
+        ranked = self._free(cloud, found.take(nearer), quality[nearer], best_first=worth[nearer])
+        if not ranked:
+            return None
+        self._ranked = ranked
+        return self.best(least=0.0)
+
+    def _look_closer(
+        self, pictures: Sequence[DepthPicture], travel: Travel
+    ) -> list[DepthPicture] | Cause:
+        """Pictures of the wrist's camera above the most promising places.
+
+        What depth does not show is looked at from two sides, where a look is left: opposite
+        outlines lean over it alike, and its middle is between.
+        """
+        found = self._unspoilt(self._sampled(merged_cloud(pictures)))
+        quality = self._ranking(pictures, found) if len(found) else np.empty(0)
+        places = found.world_from_contact[:, :3, 3]
+        wanted = self._policy.wrist_views
+        here = self._robot.pose()
+        looks = [(place, here) for place in best_apart(places, quality, wanted)]
+        for contact in unseen_contacts(pictures)[: wanted - len(looks)]:
+            looks += [(contact[:3, 3], here), (contact[:3, 3], turned_about(here))]
+        more = []
+        for place, heading in looks:
+            pose = gripper_above(place, self._policy.wrist_view_m, heading)
+            if not self._robot.reachable(pose):
+                continue
+            if travel(pose) is not None:
+                continue  # something is in the way: look from where others are
+            picture = self._eyes.wrist(place, self._policy.wrist_view_m / 2)
+            if picture is None:
+                return Cause.CAMERA_STOPPED
+            more.append(picture)
+        return more
+
+    def _free(
+        self,
+        cloud: Cloud,
+        found: Candidates,
+        quality: Float[np.ndarray, " k"],
+        best_first: Float[np.ndarray, " k"],
+    ) -> list[Choice]:
+        """Those whose rigid parts meet nothing, in order."""
+        poses = found.world_from_contact
+        free = free_of_collision(poses, cloud.points_m, self._config.hand)
+        order = np.argsort(-best_first, kind="stable")
+        return [Choice(poses[i], float(quality[i])) for i in order if free[i]]
+
+    def _sampled(self, cloud: Cloud) -> Candidates:
+        return sample_candidates(
+            cloud,
+            self._policy.candidates,
+            self._normal_radius_m,
+            self._policy.tilt_max_rad,
+            self._rng,
+        )
+
+    def _sampled_near(self, cloud: Cloud, place_m: Float[np.ndarray, " 3"]) -> Candidates:
+        return sample_near(
+            cloud,
+            place_m,
+            self._policy.regrasp_radius_m,
+            self._policy.local_candidates,
+            self._normal_radius_m,
+            self._policy.tilt_max_rad,
+            self._rng,
+        )
+
+    def _unspoilt(self, found: Candidates) -> Candidates:
+        """Without those too near to a contact that failed before."""
+        places = found.world_from_contact[:, :3, 3]
+        return found.take(np.array([self._fresh(place) for place in places], dtype=bool))
+
+    def _fresh(self, place_m: Float[np.ndarray, " 3"]) -> bool:
+        return all(
+            np.linalg.norm(place_m - contact) > self._policy.avoid_radius_m
+            for contact in self._avoid_m
+        )
+
+    def _can_reach(self, contact: Pose) -> bool:
+        above = backed_off(contact, self._policy.standoff_m)
+        return self._robot.reachable(above) and self._robot.reachable(contact)

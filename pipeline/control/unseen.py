@@ -1,0 +1,113 @@
+"""What colour shows and depth does not: transparent objects, felt for where their outlines meet.
+
+A depth camera measures what lies behind a transparent object (Supplement VIII, first failure). With
+a segmentation of the colour pictures, an instance whose pixels were measured no higher than the
+table is such an object. Its outlines from several viewpoints bound it: the visual hull (Laurentini,
+1994), all places that every picture shows within the outline. Where it is, the hull tells well; how
+high, only at most: the pad goes down until it touches.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pipeline.control.cloud import TABLE_CLEARANCE_M, DepthPicture, heights_m
+from pipeline.geometry.transforms import invert, transform_points
+
+TABLE = 0  # instance of the table and of nothing
+_FEWEST_PIXELS = 30  # fewer say too little of an outline
+_MEASURED = 0.2  # an object is seen where this share of its pixels lies above the table
+_CELL_M = 0.004
+_HIGHEST_M = 0.15
+_AROUND_M = 0.06  # the hull may lean this far over what the outline covers of the table
+
+
+def unseen_contacts(pictures: Sequence[DepthPicture]) -> list[Float[np.ndarray, "4 4"]]:
+    """A level contact on top of each object that depth does not show; world_from_contact.
+
+    Objects are told by the first picture's instances; pictures without instances tell nothing.
+    """
+    segmented = [picture for picture in pictures if picture.instances is not None]
+    found = (hull_top(segmented, name) for name in unseen_instances(segmented))
+    return [contact for contact in found if contact is not None]
+
+
+def unseen_instances(pictures: Sequence[DepthPicture]) -> list[int]:
+    """Instances of which, over all pictures, hardly a pixel was measured above the table."""
+    shown: dict[int, int] = {}
+    above: dict[int, int] = {}
+    for picture in pictures:
+        instances = _instances(picture)
+        high = heights_m(picture) > TABLE_CLEARANCE_M
+        for name, count in zip(*np.unique(instances, return_counts=True), strict=True):
+            shown[int(name)] = shown.get(int(name), 0) + int(count)
+            above[int(name)] = above.get(int(name), 0) + int(high[instances == name].sum())
+    return [
+        name
+        for name, count in sorted(shown.items())
+        if name != TABLE and count >= _FEWEST_PIXELS and above[name] < _MEASURED * count
+    ]
+
+
+def hull_top(pictures: Sequence[DepthPicture], name: int) -> Float[np.ndarray, "4 4"] | None:
+    """The contact, level, over the middle of an instance's visual hull; None where there is none.
+
+    A picture that was cut off short of a place says nothing of it.
+    """
+    outlines = [(picture, _instances(picture) == name) for picture in pictures]
+    outlines = [(picture, mask) for picture, mask in outlines if mask.any()]
+    if not outlines:
+        return None
+    places = _places(*outlines[0])
+    within = np.ones(len(places), dtype=bool)
+    for picture, mask in outlines:
+        within &= _within(picture, mask, places)
+    hull = places[within]
+    if len(hull) == 0:
+        return None
+    contact = np.eye(4)
+    contact[:3, 3] = [*hull[:, :2].mean(axis=0), hull[:, 2].max()]
+    return contact
+
+
+def _places(picture: DepthPicture, mask: Bool[np.ndarray, "h w"]) -> Float[np.ndarray, "n 3"]:
+    """Where the object may be: a grid over what its outline covers of the table, and around it."""
+    pose, k = picture.camera.world_from_camera, picture.camera.intrinsics
+    rows, columns = np.nonzero(mask)
+    rays = (
+        np.column_stack(
+            [
+                (columns + 0.5 - k[0, 2]) / k[0, 0],
+                (rows + 0.5 - k[1, 2]) / k[1, 1],
+                np.ones(len(rows)),
+            ]
+        )
+        @ pose[:3, :3].T
+    )
+    down = rays[:, 2] < 0
+    on_table = pose[:2, 3] - rays[down, :2] * (pose[2, 3] / rays[down, 2])[:, None]
+    low, high = on_table.min(axis=0) - _AROUND_M, on_table.max(axis=0) + _AROUND_M
+    axes = [np.arange(low[axis], high[axis], _CELL_M) for axis in range(2)]
+    heights = np.arange(_CELL_M / 2, _HIGHEST_M, _CELL_M)
+    return np.stack(np.meshgrid(*axes, heights, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
+def _within(
+    picture: DepthPicture, mask: Bool[np.ndarray, "h w"], places_m: Float[np.ndarray, "n 3"]
+) -> Bool[np.ndarray, " n"]:
+    """Whether a picture shows each place within the outline, or does not show it."""
+    k = picture.camera.intrinsics
+    x, y, z = transform_points(invert(picture.camera.world_from_camera), places_m).T
+    column = np.floor(k[0, 0] * x / z + k[0, 2]).astype(np.int64)
+    row = np.floor(k[1, 1] * y / z + k[1, 2]).astype(np.int64)
+    height, width = mask.shape
+    shown = (z > 0) & (row >= 0) & (row < height) & (column >= 0) & (column < width)
+    inside = ~shown
+    inside[shown] = mask[row[shown], column[shown]]
+    return np.asarray(inside)
+
+
+def _instances(picture: DepthPicture) -> Int[np.ndarray, "h w"]:
+    assert picture.instances is not None
+    return picture.instances
