@@ -21,7 +21,7 @@ from pipeline.control.decision import Cause
 from pipeline.control.success import success_rate
 from pipeline.execution import RunFolder, generator, progress, run_command, run_in_order
 from pipeline.simulation.picking import Clutter, strategy_of
-from pipeline.simulation.scenarios import SCENARIOS, Scenario, trials
+from pipeline.simulation.scenarios import SCENARIOS, seeing, trials
 from stages.evaluate import SCORE_BATCH, network
 from stages.graph import RUNS_DIR
 
@@ -89,14 +89,6 @@ def tried(job: ScenarioJob) -> Row:
         causes[str(clutter.attempted(strategy, []).cause)] += 1
     lifted = causes.pop(str(Cause.LIFTED), 0)
     return Row(scenario.name, job.policy, lifted, job.trials, dict(sorted(causes.items())))
-
-
-def seeing(config: RunConfig, scenario: Scenario) -> RunConfig:
-    """The run's configuration, with segmented pictures where the scenario has them."""
-    if not scenario.segmented:
-        return config
-    evaluate = config.evaluate.model_copy(update={"segmentation": "ideal"})
-    return config.model_copy(update={"evaluate": evaluate})
 
 
 def table(rows: list[Row]) -> str:

@@ -34,7 +34,7 @@ def gripper_above(
 
 def turned_about(world_from_gripper: Float[np.ndarray, "4 4"]) -> Float[np.ndarray, "4 4"]:
     """The pose turned by half a turn about its approach: the wrist's camera looks from opposite."""
-    return world_from_gripper * np.array([-1.0, -1.0, 1.0, 1.0])
+    return np.asarray(world_from_gripper * np.array([-1.0, -1.0, 1.0, 1.0]))
 
 
 def facing(

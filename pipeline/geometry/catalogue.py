@@ -19,8 +19,7 @@ from pipeline.geometry.shape import (
     mass_properties,
     nsvr,
     shape_class,
-    surface_area,
-    volume,
+    solid_properties,
 )
 
 Material = Literal["opaque", "transparent"]
@@ -83,14 +82,12 @@ def finish_object(
 ) -> CatalogueObject:
     """Rescaling, centring, mass properties and convex parts (S-1.01's object, at its size).
 
-    rng: draws the target extent alone. cache_dir: where convex parts are kept. NSVR is the
-    measured one: rescaling does not change it.
+    rng: draws the target extent alone. cache_dir: where convex parts are kept.
     """
     target = _target_extent_m(measured.mesh, config, rng)
     scaled, scale = rescale(measured.mesh, target)
     centre = mass_properties(scaled, config.density_kg_m3).centre_of_mass_m
     mesh = Mesh(scaled.vertices_m - centre, scaled.faces)
-    mass = mass_properties(mesh, config.density_kg_m3)
     source = measured.source
     return CatalogueObject(
         name=source.name,
@@ -102,13 +99,7 @@ def finish_object(
         scale=scale,
         stretch=np.ones(3),
         target_extent_m=target,
-        area_m2=surface_area(mesh),
-        volume_m3=volume(mesh),
-        nsvr=measured.nsvr,
-        shape_class=measured.shape_class,
-        mass_kg=mass.mass_kg,
-        centre_of_mass_m=mass.centre_of_mass_m,
-        inertia_kg_m2=mass.inertia_kg_m2,
+        **solid_properties(mesh, config.density_kg_m3),
         mesh=mesh,
         convex_parts=convex_parts(mesh, config.convex, cache_dir),
         material=material_of(source.name, config),
@@ -130,21 +121,13 @@ def stretched_copy(
     target = _target_extent_m(stretched, config, rng)
     mesh, scale = rescale(stretched, target)
     parts = [Mesh(part.vertices_m * (scale * stretch), part.faces) for part in item.convex_parts]
-    mass = mass_properties(mesh, config.density_kg_m3)
-    value = nsvr(mesh)
     return replace(
         item,
         name=name,
         scale=item.scale * scale,
         stretch=item.stretch * stretch,
         target_extent_m=target,
-        area_m2=surface_area(mesh),
-        volume_m3=volume(mesh),
-        nsvr=value,
-        shape_class=shape_class(value),
-        mass_kg=mass.mass_kg,
-        centre_of_mass_m=mass.centre_of_mass_m,
-        inertia_kg_m2=mass.inertia_kg_m2,
+        **solid_properties(mesh, config.density_kg_m3),
         mesh=mesh,
         convex_parts=tuple(parts),
     )

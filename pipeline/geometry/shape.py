@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import TypedDict
 
 import numpy as np
 from jaxtyping import Float
@@ -28,6 +29,32 @@ class MassProperties:
     centre_of_mass_m: Float[np.ndarray, " 3"]
     inertia_kg_m2: Float[np.ndarray, "3 3"]
     """About the centre of mass, along the mesh frame's axes."""
+
+
+class SolidProperties(TypedDict):
+    """All that a closed mesh of one density says of its object, by the catalogue's names."""
+
+    area_m2: float
+    volume_m3: float
+    nsvr: float
+    shape_class: ShapeClass
+    mass_kg: float
+    centre_of_mass_m: Float[np.ndarray, " 3"]
+    inertia_kg_m2: Float[np.ndarray, "3 3"]
+
+
+def solid_properties(mesh: Mesh, density_kg_m3: float) -> SolidProperties:
+    """The functions below, together. Raises ValueError where the volume is not positive."""
+    mass, value = mass_properties(mesh, density_kg_m3), nsvr(mesh)
+    return {
+        "area_m2": surface_area(mesh),
+        "volume_m3": volume(mesh),
+        "nsvr": value,
+        "shape_class": shape_class(value),
+        "mass_kg": mass.mass_kg,
+        "centre_of_mass_m": mass.centre_of_mass_m,
+        "inertia_kg_m2": mass.inertia_kg_m2,
+    }
 
 
 def surface_area(mesh: Mesh) -> float:

@@ -13,9 +13,10 @@ import trimesh
 from jaxtyping import Float
 
 from pipeline.clutter.scene import ClutterScene, PlacedObject
+from pipeline.config import RunConfig
 from pipeline.geometry.catalogue import CatalogueObject, Material
 from pipeline.geometry.mesh import Mesh
-from pipeline.geometry.shape import mass_properties, nsvr, shape_class, surface_area, volume
+from pipeline.geometry.shape import solid_properties
 
 _DENSITY_KG_M3 = 300.0
 _FACE_M = 0.006
@@ -52,6 +53,14 @@ SCENARIOS = (
     Scenario("moving, 50 mm/s", _PLAIN, speed_m_s=0.050),
     Scenario("moving, 100 mm/s", _PLAIN, speed_m_s=0.100),
 )
+
+
+def seeing(config: RunConfig, scenario: Scenario) -> RunConfig:
+    """The run's configuration, with segmented pictures where the scenario has them."""
+    if not scenario.segmented:
+        return config
+    evaluate = config.evaluate.model_copy(update={"segmentation": "ideal"})
+    return config.model_copy(update={"evaluate": evaluate})
 
 
 def trials(
@@ -96,8 +105,6 @@ def _box(scenario: Scenario) -> CatalogueObject:
     mesh = Mesh(np.asarray(shape.vertices, np.float64), np.asarray(shape.faces, np.int64))
     coarse = trimesh.creation.box(scenario.sides_m)
     part = Mesh(np.asarray(coarse.vertices, np.float64), np.asarray(coarse.faces, np.int64))
-    mass = mass_properties(mesh, _DENSITY_KG_M3)
-    value = nsvr(mesh)
     return CatalogueObject(
         name=scenario.name,
         source="scenario",
@@ -108,13 +115,7 @@ def _box(scenario: Scenario) -> CatalogueObject:
         scale=1.0,
         stretch=np.ones(3),
         target_extent_m=max(scenario.sides_m),
-        area_m2=surface_area(mesh),
-        volume_m3=volume(mesh),
-        nsvr=value,
-        shape_class=shape_class(value),
-        mass_kg=mass.mass_kg,
-        centre_of_mass_m=mass.centre_of_mass_m,
-        inertia_kg_m2=mass.inertia_kg_m2,
+        **solid_properties(mesh, _DENSITY_KG_M3),
         mesh=mesh,
         convex_parts=(part,),
         material=scenario.material,

@@ -7,7 +7,7 @@ from pipeline.config import RunConfig
 from pipeline.control.decision import Cause
 from pipeline.control.ranking import Predict
 from pipeline.simulation.picking import Clutter, strategy_of
-from pipeline.simulation.scenarios import SCENARIOS, trials
+from pipeline.simulation.scenarios import SCENARIOS, seeing, trials
 
 BY_NAME = {scenario.name: scenario for scenario in SCENARIOS}
 CONFIG = RunConfig()
@@ -26,9 +26,10 @@ def tried(name: str, predict: Predict = flatness, seed: int = 0) -> tuple[Cause,
     rng = np.random.default_rng(seed)
     scenario = BY_NAME[name]
     scene, objects = next(trials(scenario, 1, rng))
-    clutter = Clutter(scene, objects, CONFIG, rng)
+    config = seeing(CONFIG, scenario)
+    clutter = Clutter(scene, objects, config, rng)
     clutter.gripper.conveyor_m_s = scenario.speed_m_s
-    return clutter.attempted(strategy_of("closed-loop", predict, CONFIG), []).cause, clutter
+    return clutter.attempted(strategy_of("closed-loop", predict, config), []).cause, clutter
 
 
 def test_a_plain_box_is_lifted() -> None:
@@ -39,6 +40,12 @@ def test_a_plain_box_is_lifted() -> None:
 
 def test_a_slow_box_is_caught_in_motion() -> None:
     assert tried("moving, 10 mm/s")[0] is Cause.LIFTED
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_transparent_box_is_found_by_its_outline_alone(seed: int) -> None:
+    assert tried("transparent", seed=seed)[0] is not Cause.LIFTED
+    assert tried("transparent, segmented", seed=seed)[0] is Cause.LIFTED
 
 
 @pytest.mark.parametrize("name", ["flush neighbours", "slim, side by side"])
