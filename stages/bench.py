@@ -30,7 +30,8 @@ from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.shape import ShapeClass
 from pipeline.gripper.heights import pad_heights
-from pipeline.network.export import OnnxPredictor, checked_against, export_onnx_bytes
+from pipeline.network.control_inference import ControlPredictor, checked_against
+from pipeline.network.export import export_onnx_bytes
 from pipeline.network.ga_cnn import GaCnn, build_network
 from pipeline.network.inference import predict
 from pipeline.network.timing import milliseconds_a_grasp
@@ -305,9 +306,9 @@ def inference(bench: Bench) -> dict[str, object]:
     samples = stored_samples(bench)
     cloud, mask = samples.cloud[:512], samples.cloud_mask[:512]
     runtimes = {
-        "onnx": exported.predict,
-        "pytorch": lambda clouds, masks, size: predict(
-            network, clouds, masks, size, NETWORK_THREADS, average_symmetries=False
+        "openvino": exported.predict,
+        "pytorch": lambda clouds, masks: predict(
+            network, clouds, masks, len(clouds), NETWORK_THREADS, average_symmetries=False
         ),
     }
     times = {name: milliseconds_a_grasp(run, cloud, mask) for name, run in runtimes.items()}
@@ -323,11 +324,11 @@ def inference(bench: Bench) -> dict[str, object]:
     }
 
 
-def sized_network(bench: Bench) -> tuple[GaCnn, OnnxPredictor]:
+def sized_network(bench: Bench) -> tuple[GaCnn, ControlPredictor]:
     """The network of the run and its export; its weights are untrained and change no time."""
     network = build_network(bench.config.network, seed=0).eval()
     threads = min(NETWORK_THREADS, os.cpu_count() or 1)
-    return network, OnnxPredictor(export_onnx_bytes(network), threads)
+    return network, ControlPredictor(export_onnx_bytes(network), threads)
 
 
 def control_steps(bench: Bench) -> dict[str, object]:

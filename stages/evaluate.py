@@ -4,7 +4,7 @@ import os
 import shutil
 import sys
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 from pathlib import Path
 
 from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact, publish_bytes
@@ -17,6 +17,7 @@ from pipeline.artifacts.training_messages import EXPORT
 from pipeline.clutter.scene import ClutterScene
 from pipeline.config import RunConfig
 from pipeline.config.evaluation import PolicyName
+from pipeline.config.grasps import PadConfig
 from pipeline.errors import ArtifactError
 from pipeline.execution import (
     RunFolder,
@@ -28,15 +29,15 @@ from pipeline.execution import (
     stage_command,
 )
 from pipeline.geometry.catalogue import CatalogueObject
-from pipeline.network.export import OnnxPredictor
+from pipeline.network.control_inference import ControlPredictor
 from pipeline.recording.evaluate import blueprint, show_attempts, worst_first
 from pipeline.recording.recording import recording, spread
 from pipeline.recording.results import markdown
+from pipeline.recording.robot import ShownRobot
 from pipeline.simulation.picking import run_clutter
 from schemas.softgrip.v1.evaluation_pb2 import Attempt, Comparison, LevelResult
 from stages.graph import EVALUATE, RUNS_DIR, inputs_of
 
-SCORE_BATCH = 64
 SCORE_THREADS = 1  # clutters run side by side, a worker a core
 
 
@@ -99,7 +100,7 @@ def pick_clutter(job: ClutterJob) -> Path:
     if is_current(job.path, job.provenance.key):
         return job.path
     objects = {name: item for name, (item, _) in catalogue(job.objects).items()}
-    score = partial(network(job.checkpoint).predict, batch_size=SCORE_BATCH)
+    score = network(job.checkpoint).predict
     rng = generator(job.config.seed, "evaluate", job.scene.scene_id)
     made = run_clutter(job.scene, objects, job.policy, score, job.config, rng)
     scene = job.scene
@@ -119,10 +120,10 @@ def catalogue(objects: Path) -> dict[str, tuple[CatalogueObject, str]]:
 
 
 @lru_cache(maxsize=1)
-def network(checkpoint: Path) -> OnnxPredictor:
+def network(checkpoint: Path) -> ControlPredictor:
     """The trained network as exported for control, read once a worker."""
     with open_artifact(checkpoint) as artifact:
-        return OnnxPredictor(artifact.attachment(EXPORT), SCORE_THREADS)
+        return ControlPredictor(artifact.attachment(EXPORT), SCORE_THREADS)
 
 
 def read_attempts(path: Path) -> list[Attempt]:
@@ -140,8 +141,10 @@ def publish(
     ordered = worst_first(attempts)
     shown = [ordered[i] for i in spread(len(ordered), stage.config.recording.attempts)]
     text = markdown(results.levels, results.policies, results.comparisons)
-    with recording(stage.recording, stage.stage.name, stage.key.digest, blueprint()) as stream:
-        show_attempts(stream, shown, names, meshes, text)
+    larger = stage.config.gripper.pad.radius_m / PadConfig().radius_m
+    view = blueprint(stage.config.evaluate.robot == "iiwa14", larger)
+    with recording(stage.recording, stage.stage.name, stage.key.digest, view) as stream:
+        show_attempts(stream, shown, names, meshes, text, shown_robot(stage.config))
     publish_bytes(stage.folder.path / "evaluate.md", text.encode())
     with ArtifactWriter(stage.output, stage.provenance()) as artifact:
         for number, message in enumerate(attempts):
@@ -152,6 +155,11 @@ def publish(
             artifact.write("/policies", result, log_time_ns=number)
         for number, comparison in enumerate(results.comparisons):
             artifact.write("/comparisons", comparison, log_time_ns=number)
+
+
+def shown_robot(config: RunConfig) -> ShownRobot:
+    """What the film shows of the robot beside its poses."""
+    return ShownRobot(config.gripper.pad.radius_m, config.evaluate.hand, config.evaluate.arm)
 
 
 def print_table(folder: RunFolder) -> None:

@@ -22,7 +22,7 @@ from pipeline.control.success import success_rate
 from pipeline.execution import RunFolder, generator, progress, run_command, run_in_order
 from pipeline.simulation.picking import Clutter, strategy_of
 from pipeline.simulation.scenarios import SCENARIOS, seeing, trials
-from stages.evaluate import SCORE_BATCH, network
+from stages.evaluate import network
 from stages.graph import RUNS_DIR
 
 TRIALS = 10
@@ -75,10 +75,7 @@ def tried(job: ScenarioJob) -> Row:
     """One attempt at each trial."""
     scenario = SCENARIOS[job.index]
     config = seeing(job.config, scenario)
-    predictor = network(job.checkpoint)
-    strategy = strategy_of(
-        job.policy, lambda cloud, mask: predictor.predict(cloud, mask, SCORE_BATCH), config
-    )
+    strategy = strategy_of(job.policy, network(job.checkpoint).predict, config)
     # The same scenes for every policy.
     scenes = trials(scenario, job.trials, generator(config.seed, "scenario", scenario.name))
     causes: Counter[str] = Counter()

@@ -188,8 +188,8 @@ def time_ms(network: SweepNetwork, test: Samples) -> float:
         seed=0,
     )
 
-    def ask(cloud: np.ndarray, mask: np.ndarray, size: int) -> np.ndarray:
-        return predict(made, cloud, mask, size, TIMED_THREADS, average_symmetries=False)
+    def ask(cloud: np.ndarray, mask: np.ndarray) -> np.ndarray:
+        return predict(made, cloud, mask, len(cloud), TIMED_THREADS, average_symmetries=False)
 
     (time,) = milliseconds_a_grasp(
         ask, test.cloud[:TIMED_BATCH], test.cloud_mask[:TIMED_BATCH], (TIMED_BATCH,)

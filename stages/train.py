@@ -24,7 +24,8 @@ from pipeline.artifacts.training_messages import (
 from pipeline.execution import StageContext, Summary, stage_command
 from pipeline.network.baselines import fit_monotone, mean_predictor_mae, seal_ratio
 from pipeline.network.checkpoint import save_checkpoint_bytes
-from pipeline.network.export import OnnxPredictor, checked_against, export_onnx_bytes
+from pipeline.network.control_inference import ControlPredictor, checked_against
+from pipeline.network.export import export_onnx_bytes
 from pipeline.network.figures import (
     calibration,
     error_by_class,
@@ -145,7 +146,7 @@ def export_for_control(stage: StageContext, trained: TrainedNetwork, test_set: S
     exported = export_onnx_bytes(trained.network)
     config = stage.config.train
     difference = checked_against(
-        OnnxPredictor(exported, config.threads),
+        ControlPredictor(exported, config.threads),
         trained.network,
         test_set.cloud[:COMPARED],
         test_set.cloud_mask[:COMPARED],
@@ -185,9 +186,9 @@ def inference_ms(
     """Runtime → batch size → milliseconds a grasp on the CPU, on ``train.threads`` threads."""
     threads = stage.config.train.threads
     runtimes = {
-        "onnx": OnnxPredictor(exported, threads).predict,
-        "pytorch": lambda cloud, mask, size: predict(
-            trained.network, cloud, mask, size, threads, average_symmetries=False
+        "openvino": ControlPredictor(exported, threads).predict,
+        "pytorch": lambda cloud, mask: predict(
+            trained.network, cloud, mask, len(cloud), threads, average_symmetries=False
         ),
     }
     return {

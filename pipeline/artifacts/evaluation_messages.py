@@ -27,6 +27,9 @@ def attempt_message(
         "object_paths": np.array(objects).reshape(-1, bodies, 4, 4),
         "base_wrench": np.array([s.wrench for s in samples]).reshape(-1, 6),
     }
+    joints = np.array([s.joints_rad for s in samples])
+    if joints.size:
+        arrays["joint_path"] = joints
     return evaluation_pb2.Attempt(
         scene_id=scene_id,
         level=level,

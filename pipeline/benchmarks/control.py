@@ -8,24 +8,21 @@ from pipeline.benchmarks.clock import quantiles_ms
 from pipeline.clutter.scene import ClutterScene
 from pipeline.config import RunConfig
 from pipeline.control.cloud import DepthPicture, merged_cloud
-from pipeline.control.correction import LOOK_M
 from pipeline.control.local_phase import LocalPhase
 from pipeline.control.ranking import NetworkRanking
 from pipeline.control.viewpoints import gripper_above
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.posed_bodies import PosedBodies
-from pipeline.network.export import OnnxPredictor
+from pipeline.network.control_inference import ControlPredictor
 from pipeline.sensing.cameras import camera_at
 from pipeline.sensing.depth_by_rays import measured_depth, window_around
 from pipeline.simulation.eyes import gripper_from_camera, moved
-
-SCORE_BATCH = 64
 
 
 def step_ms(
     scene: ClutterScene,
     meshes: dict[str, Mesh],
-    network: OnnxPredictor,
+    network: ControlPredictor,
     config: RunConfig,
     steps: int,
 ) -> dict[str, dict[str, float]]:
@@ -35,7 +32,7 @@ def step_ms(
         {p.body_id: meshes[p.object_name] for p in scene.objects}, config.scenes.table_side_m
     ).at({p.body_id: p.world_from_object for p in scene.objects})
     ranking = NetworkRanking(
-        lambda cloud, mask: network.predict(cloud, mask, SCORE_BATCH),
+        network.predict,
         config.sensing,
         config.gripper.pad.radius_m,
         config.evaluate.policy.smoothing_m,
@@ -55,7 +52,7 @@ def step_ms(
             pose = gripper_above(aim[:3, 3], height_m, np.eye(4))
             camera = moved(on_wrist, pose @ gripper_from_camera(config.evaluate.hand))
             times: list[float] = [time.perf_counter()]
-            window = window_around(camera, aim[:3, 3], LOOK_M)
+            window = window_around(camera, aim[:3, 3], config.evaluate.policy.look_m)
             picture = DepthPicture(measured_depth(window, surfaces, None, rng), window)
             times.append(time.perf_counter())
             found = local.look(picture, aim)

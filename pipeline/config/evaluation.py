@@ -1,9 +1,9 @@
 """[evaluate] and [recording]: the closed loop, and what recordings show."""
 
 import math
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from pipeline.config.section import Section
 
@@ -35,7 +35,10 @@ class HandConfig(Section):
 
     length_m: float = Field(0.20, gt=0.05, le=1, description="pad to flange [m]")
     stem_radius_m: float = Field(
-        0.012, gt=0, le=0.1, description="of the rigid stem above the pad [m]"
+        0.012, gt=0, le=0.1, description="radius of the rigid stem above the pad [m]"
+    )
+    stem_begins_m: float = Field(
+        0.035, gt=0, le=1, description="where the stem begins, past the pad's altitude H [m]"
     )
     camera_aside_m: float = Field(
         0.16, ge=0, le=0.5, description="camera off the axis, along x [m]"
@@ -44,6 +47,15 @@ class HandConfig(Section):
     camera_focus_m: float = Field(
         0.15, gt=0, le=2, description="where its axis meets the gripper's, below the pad [m]"
     )
+    camera_radius_m: float = Field(
+        0.031, gt=0, le=0.2, description="ball around the camera, out of an arm's way; L515 [m]"
+    )
+
+    @model_validator(mode="after")
+    def _stem_is_there(self) -> Self:
+        if self.stem_begins_m >= self.length_m:
+            raise ValueError("stem_begins_m must be less than length_m")
+        return self
 
 
 class ArmConfig(Section):
@@ -81,6 +93,12 @@ class PolicyConfig(Section):
     commit_m: float = Field(
         0.03, ge=0, description="this near to the contact nothing is corrected any more [m]"
     )
+    look_m: float = Field(
+        0.06, gt=0, description="looked at around the aim: a sub cloud, a correction more [m]"
+    )
+    another_m: float = Field(
+        0.03, ge=0, description="another place to grasp is at least so far from the last [m]"
+    )
     retargets: int = Field(
         3, ge=0, description="how often another candidate may be taken after a closer look"
     )
@@ -94,7 +112,7 @@ class PolicyConfig(Section):
         2, ge=0, description="how often an attempt grasps elsewhere what did not hold in the tug"
     )
     regrasp_quality: float = Field(
-        0.1, ge=0, le=1, description="least q-hat of another place after a seal that failed [1]"
+        0.0, ge=0, le=1, description="least q-hat of another place after a seal that failed [1]"
     )
     regrasp_lever_m: float = Field(
         0.015, ge=0, description="lever felt in the tug from which the centre is aimed at [m]"

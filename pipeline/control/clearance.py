@@ -6,8 +6,6 @@ from jaxtyping import Bool, Float
 
 from pipeline.config.evaluation import HandConfig
 
-# The soft pad drapes up to its altitude H, so the rigid stem begins above that (Table I).
-STEM_BEGINS_M = 0.035
 _MARGIN_M = 0.004
 
 
@@ -25,7 +23,7 @@ def free_of_collision(
             np.ascontiguousarray(world_from_gripper),
             np.ascontiguousarray(points_m),
             hand.stem_radius_m + _MARGIN_M,
-            STEM_BEGINS_M - _MARGIN_M,
+            hand.stem_begins_m - _MARGIN_M,
         )
     )
 

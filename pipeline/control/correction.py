@@ -9,8 +9,6 @@ from pipeline.control.clearance import free_of_collision
 from pipeline.control.cloud import DepthPicture, merged_cloud
 from pipeline.control.ranking import Ranking
 
-LOOK_M = 0.06
-"""Radius to look at around the aim: a sub cloud and the furthest correction."""
 _VOXEL_M = 0.002
 
 

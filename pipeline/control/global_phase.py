@@ -25,8 +25,6 @@ from pipeline.control.viewpoints import (
     turned_about,
 )
 
-_APART_M = 0.03  # another place to grasp, not the same once more
-
 Pose = Float[np.ndarray, "4 4"]
 Travel = Callable[[Pose], Cause | None]
 
@@ -53,7 +51,7 @@ class GlobalPhase:
         rng: np.random.Generator,
         avoid_m: Sequence[Float[np.ndarray, " 3"]],
     ) -> None:
-        """avoid_m : contacts that failed before, not to be tried again."""
+        """avoid_m : contacts that failed before, tried again only where nothing else is left."""
         self._eyes = eyes
         self._robot = robot
         self._ranking = strategy.ranking
@@ -88,7 +86,7 @@ class GlobalPhase:
         decision.candidates, decision.quality = found.world_from_contact, quality
         self._ranked = [
             *self._free(cloud, found, quality, best_first=quality),
-            *(Choice(pose, 0.0, felt_for=True) for pose in unseen if self._fresh(pose[:3, 3])),
+            *(Choice(pose, 0.0, felt_for=True) for pose in unseen),
         ]
         return None if self._ranked else Cause.NO_CANDIDATE
 
@@ -99,7 +97,7 @@ class GlobalPhase:
                 return None
             place = choice.world_from_contact[:3, 3]
             distance = [np.linalg.norm(place - aim) for aim in self._rejected_m]
-            if min(distance, default=np.inf) < _APART_M:
+            if min(distance, default=np.inf) < self._policy.another_m:
                 continue
             if self._can_reach(facing(choice.world_from_contact, self._robot.pose())):
                 return choice
@@ -206,9 +204,10 @@ class GlobalPhase:
         )
 
     def _unspoilt(self, found: Candidates) -> Candidates:
-        """Without those too near to a contact that failed before."""
+        """Without those too near to a contact that failed before; all, where no other is left."""
         places = found.world_from_contact[:, :3, 3]
-        return found.take(np.array([self._fresh(place) for place in places], dtype=bool))
+        fresh = np.array([self._fresh(place) for place in places], dtype=bool)
+        return found.take(fresh) if fresh.any() else found
 
     def _fresh(self, place_m: Float[np.ndarray, " 3"]) -> bool:
         return all(

@@ -9,9 +9,11 @@ from jaxtyping import Float
 
 from pipeline.config.evaluation import EvaluateConfig
 from pipeline.control.cloud import DepthPicture, merged_cloud
-from pipeline.control.correction import LOOK_M, corrected
+from pipeline.control.correction import corrected
 from pipeline.control.motion import Motion
 from pipeline.control.ranking import Ranking
+
+_SHOWN = 0.9  # of the radius looked at, what a picture is sure to show
 
 Pose = Float[np.ndarray, "4 4"]
 
@@ -34,7 +36,9 @@ class LocalPhase:
 
     def start_over(self) -> None:
         """Another place is aimed at: how the last one moved says nothing of it."""
-        self._motion = Motion(1.0 / self._config.policy.rate_hz, 0.9 * LOOK_M)
+        self._motion = Motion(
+            1.0 / self._config.policy.rate_hz, _SHOWN * self._config.policy.look_m
+        )
 
     @property
     def moves(self) -> bool:

@@ -16,7 +16,6 @@ import numpy as np
 from jaxtyping import Float
 
 from pipeline.config.evaluation import EvaluateConfig
-from pipeline.control.correction import LOOK_M
 from pipeline.control.decision import Cause, Decision, Strategy
 from pipeline.control.global_phase import Choice, GlobalPhase
 from pipeline.control.local_phase import LocalPhase, way_left_m
@@ -46,7 +45,7 @@ class Attempt:
         rng: np.random.Generator,
         avoid_m: Sequence[Float[np.ndarray, " 3"]] = (),
     ) -> None:
-        """avoid_m : contacts that failed before, not to be tried again."""
+        """avoid_m : contacts that failed before, tried again only where nothing else is left."""
         self._eyes = eyes
         self._robot = robot
         self._strategy = strategy
@@ -162,7 +161,7 @@ class Attempt:
     def _correct(self) -> Cause | None:
         """Look again and take the best contact near the one aimed at, where it promises more."""
         aim = self.decision.world_from_contact
-        picture = self._eyes.wrist(aim[:3, 3], LOOK_M)
+        picture = self._eyes.wrist(aim[:3, 3], self._policy.look_m)
         if picture is None:
             return Cause.CAMERA_STOPPED
         found = self._local.look(picture, aim)

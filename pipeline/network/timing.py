@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 Predict = Callable[
-    [Float[np.ndarray, "n h w 3"], Bool[np.ndarray, "n h w"], int], Float[np.ndarray, " n"]
+    [Float[np.ndarray, "n h w 3"], Bool[np.ndarray, "n h w"]], Float[np.ndarray, " n"]
 ]
 
 BATCHES = (1, 64, 512)
@@ -26,7 +26,7 @@ def milliseconds_a_grasp(
 
     Parameters
     ----------
-    predict : cloud, mask and batch size to quality.
+    predict : clouds and masks to quality, as one batch.
     cloud, mask : grasps to predict; repeated where a batch is larger.
     seconds : so long, and at least three times, each batch size is called.
     """
@@ -34,11 +34,11 @@ def milliseconds_a_grasp(
     for size in batches:
         rows = np.arange(size) % len(cloud)
         clouds, masks = np.ascontiguousarray(cloud[rows]), np.ascontiguousarray(mask[rows])
-        predict(clouds, masks, size)
+        predict(clouds, masks)
         times: list[float] = []
         while len(times) < _FEWEST_CALLS or sum(times) < seconds:
             started = time.perf_counter()
-            predict(clouds, masks, size)
+            predict(clouds, masks)
             times.append(time.perf_counter() - started)
         figures[str(size)] = 1e3 * float(np.median(times)) / size
     return figures

@@ -1,4 +1,4 @@
-"""evaluate.rrd: a film of the attempts, worst failure first: scene, gripper, what was seen, felt.
+"""evaluate.rrd: a film of the attempts, worst failure first: scene, robot, what was seen, felt.
 
 The worst failure is the one that promised most: the highest q-hat among those that did not lift.
 """
@@ -13,27 +13,37 @@ from pipeline.artifacts.tensors import from_tensor
 from pipeline.geometry.mesh import Mesh
 from pipeline.recording import colours
 from pipeline.recording.recording import looking, name_curve, numbered, step, time_panel
+from pipeline.recording.robot import (
+    GRIPPER,
+    ShownRobot,
+    send_arm,
+    send_poses,
+    show_arm,
+    show_gripper,
+)
 from pipeline.recording.shapes import shown_mesh, shown_pose
 from schemas.softgrip.v1.evaluation_pb2 import Attempt, DepthPicture
 
 TIMELINE = "frame"
-PAD_RADIUS_M = 0.025
-STEM_RADIUS_M = 0.012
-STEM_M = 0.165
 SHOWN_CANDIDATES = 60  # the best of them: more hide the scene
 APPROACH_M = 0.025
 CAMERAS = ("static_0", "wrist")
 STATES = ("observe", "pregrasp", "approach", "seal", "lift", "shake", "done")
 
 
-def blueprint() -> rrb.Blueprint:
-    """Opens on the worst failure."""
+def blueprint(with_arm: bool = False, times: float = 1.0) -> rrb.Blueprint:
+    """Opens on the worst failure; where an arm reaches in, from beside it.
+
+    times : how much larger all is than with the pad of Table I.
+    """
+    from_m = (0.5, -1.05, 0.8) if with_arm else (-0.55 * times, -0.55 * times, 0.5 * times)
+    at_m = (-0.2, 0.0, 0.25) if with_arm else (0.0, 0.0, 0.08 * times)
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Spatial3DView(
                 origin="/world",
                 name="Scene, gripper and its path, candidates by q-hat",
-                eye_controls=looking((-0.55, -0.55, 0.5), (0.0, 0.0, 0.08)),
+                eye_controls=looking(from_m, at_m),
             ),
             rrb.Vertical(
                 rrb.TextDocumentView(origin="/notes/attempt", name="Attempt"),
@@ -64,6 +74,7 @@ def show_attempts(
     names: Mapping[str, Sequence[str]],
     meshes: Mapping[str, Mesh],
     table: str,
+    robot: ShownRobot,
 ) -> None:
     """Film the attempts in their order; ``names`` are each scene's objects by body id."""
     stream.log(
@@ -74,7 +85,9 @@ def show_attempts(
             curve, label = f"curves/{quantity}/{axis}", f"{axis} in {unit}"
             name_curve(stream, curve, label, colours.PALETTE[hue])
     name_curve(stream, "curves/state", ", ".join(STATES), colours.PALETTE[4])
-    _show_gripper(stream)
+    show_gripper(stream, robot)
+    if any(made.HasField("joint_path") for made in attempts):
+        show_arm(stream)
     frame = 0
     for number, made in enumerate(attempts):
         step(stream, TIMELINE, frame)
@@ -88,6 +101,9 @@ def show_attempts(
         if len(path):
             stream.log("world/path", rr.LineStrips3D([path[:, :3, 3]], radii=0.001))
             _show_motion(stream, objects, made, frame)
+            if made.HasField("joint_path"):
+                frames = frame + np.arange(len(path))
+                send_arm(stream, TIMELINE, frames, from_tensor(made.joint_path), robot)
         frame += len(path)
 
 
@@ -102,28 +118,6 @@ def worst_first(attempts: Sequence[Attempt]) -> list[Attempt]:
             a.policy,
             a.attempt,
         ),
-    )
-
-
-def _show_gripper(stream: rr.RecordingStream) -> None:
-    """Pad and stem, in GCS; their pose is logged frame by frame."""
-    stream.log(
-        "world/gripper/pad",
-        rr.Cylinders3D(
-            lengths=[0.004], radii=[PAD_RADIUS_M], colors=[colours.PALETTE[6]], fill_mode="solid"
-        ),
-        static=True,
-    )
-    stream.log(
-        "world/gripper/stem",
-        rr.Cylinders3D(
-            lengths=[STEM_M],
-            radii=[STEM_RADIUS_M],
-            centers=[[0.0, 0.0, 0.035 + STEM_M / 2]],
-            colors=[colours.PALETTE[7]],
-            fill_mode="solid",
-        ),
-        static=True,
     )
 
 
@@ -167,11 +161,11 @@ def _show_motion(stream: rr.RecordingStream, objects: str, made: Attempt, first:
         body = f"{objects}/{index + 1:02d}"
         gone = np.flatnonzero(~there[:, index])
         until = int(gone[0]) if gone.size else len(path)
-        _send_poses(stream, body, frames[:until], bodies[:until, index])
+        send_poses(stream, TIMELINE, body, frames[:until], bodies[:until, index])
         if gone.size:
             step(stream, TIMELINE, int(frames[until]))
             stream.log(body, rr.Clear(recursive=True))
-    _send_poses(stream, "world/gripper", frames, path)
+    send_poses(stream, TIMELINE, GRIPPER, frames, path)
     wrench = from_tensor(made.base_wrench)
     curves = [f"{quantity}/{axis}" for quantity in ("force", "moment") for axis in "xyz"]
     states = [STATES.index(state) for state in made.states]
@@ -181,16 +175,6 @@ def _show_motion(stream: rr.RecordingStream, objects: str, made: Attempt, first:
             indexes=[rr.TimeColumn(TIMELINE, sequence=frames)],
             columns=rr.Scalars.columns(scalars=values),
         )
-
-
-def _send_poses(
-    stream: rr.RecordingStream, entity: str, frames: np.ndarray, poses: np.ndarray
-) -> None:
-    """A frame's pose at each of some frames of the film."""
-    if len(frames):
-        columns = rr.Transform3D.columns(translation=poses[:, :3, 3], mat3x3=poses[:, :3, :3])
-        indexes = [rr.TimeColumn(TIMELINE, sequence=frames)]
-        stream.send_columns(entity, indexes=indexes, columns=columns)
 
 
 def _facts(made: Attempt) -> str:

@@ -1,8 +1,9 @@
 """The gripper on a KUKA LBR iiwa 14 R820: SAPIEN's articulation, Pinocchio's inverse kinematics.
 
 Straight lines of the gripper become joint targets at every physics step; joints keep their range,
-speed and torque. Gravity is compensated, as the real arm's controller does. Links collide with
-objects and the table; with each other they do not.
+speed and torque. Gravity is compensated, as the real arm's controller does. Links push the objects
+and the table that they meet; where they would meet each other or the table, targets count as out
+of reach and motions stop.
 """
 
 import tempfile
@@ -17,6 +18,7 @@ from pipeline.control.viewpoints import gripper_above
 from pipeline.errors import SoftgripError
 from pipeline.geometry.compiled_poses import pose_of
 from pipeline.geometry.transforms import invert
+from pipeline.simulation.arm_clearance import ArmClearance
 from pipeline.simulation.engine import sapien_pose
 from pipeline.simulation.iiwa14 import AXES, GRIPPER_LINK, LIMITS_RAD, urdf
 
@@ -27,13 +29,16 @@ _ELBOW_UP = np.array([0.0, 0.5, 0.0, -1.4, 0.0, 1.2, 0.0])
 _SEEDS = 12
 _HEADINGS = 8
 _ITERATIONS = 150
+_GIVES_RAD = (0.1, 0.3, 0.6)  # of the elbow, where a joint is at its end
 _BY_ITSELF = [1, 1, 1, 0]  # shapes that share a bit of the third group do not collide
 
 
 class ArmMover:
     """`pipeline.simulation.floating.Mover`: the arm beside the table."""
 
-    def __init__(self, world: sapien.Scene, hand: HandConfig, arm: ArmConfig) -> None:
+    def __init__(
+        self, world: sapien.Scene, hand: HandConfig, arm: ArmConfig, pad_radius_m: float
+    ) -> None:
         self._world = world  # the articulation is the world's: it must outlive this
         self._timestep_s = world.timestep
         self._base = np.eye(4)
@@ -52,6 +57,7 @@ class ArmMover:
         for joint, axis in zip(self._joints, AXES, strict=True):
             joint.set_drive_properties(_STIFFNESS, _DAMPING, force_limit=axis.torque_nm)
         self._model = self._articulation.create_pinocchio_model()
+        self._clearance = ArmClearance(hand, pad_radius_m, arm.base_m[2])
         rng = np.random.default_rng(0)
         self._seeds = [_ELBOW_UP, *(rng.uniform(-0.8, 0.8, 7) * LIMITS_RAD for _ in range(_SEEDS))]
         self._home_rad = self._most_comfortable(arm)
@@ -66,13 +72,16 @@ class ArmMover:
 
     def drive(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> bool:
         """Joint targets a physics step nearer to the pose; False where the arm cannot follow."""
-        wanted = self._solution(world_from_gripper, self._q_rad)
+        wanted = self._followed(world_from_gripper)
         if wanted is None:
             self._to_drives(np.zeros(7))
             return False
         step = wanted - self._q_rad
         most = float(np.max(np.abs(step) / (_SPEEDS * self._timestep_s)))
         step /= max(most, 1.0)
+        if not self._clearance.is_free(self._q_rad + step):
+            self._to_drives(np.zeros(7))
+            return False
         self._q_rad = self._q_rad + step
         self._to_drives(step / self._timestep_s)
         return True
@@ -83,7 +92,7 @@ class ArmMover:
         return np.asarray(pose_of(placed.p.astype(np.float64), placed.q.astype(np.float64)))
 
     def reachable(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> bool:
-        """Whether joints within their ranges reach the pose."""
+        """Whether joints within their ranges reach the pose, clear of the arm and the table."""
         return self.joints_at(world_from_gripper, self._q_rad) is not None
 
     def owns(self, entity: sapien.Entity) -> bool:
@@ -96,7 +105,7 @@ class ArmMover:
         """Joint angles for a pose, sought from some angles first, then from elsewhere."""
         for seed in (near_rad, *self._seeds):
             found = self._solution(world_from_gripper, seed)
-            if found is not None:
+            if found is not None and self._clearance.is_free(found):
                 return found
         return None
 
@@ -108,7 +117,7 @@ class ArmMover:
             x_axis[:2, 0] = [np.cos(heading), np.sin(heading)]
             home = gripper_above(np.asarray(arm.home_m), 0.0, x_axis)
             found += [self._solution(home, seed) for seed in self._seeds]
-        solved = [q for q in found if q is not None]
+        solved = [q for q in found if q is not None and self._clearance.is_free(q)]
         if not solved:
             raise SoftgripError(
                 f"the arm at {arm.base_m} cannot hold its gripper at home, {arm.home_m}",
@@ -139,6 +148,26 @@ class ArmMover:
             return None
         q_rad = np.asarray((np.asarray(found) + np.pi) % (2 * np.pi) - np.pi)
         return q_rad if bool((np.abs(q_rad) <= LIMITS_RAD - _MARGIN_RAD).all()) else None
+
+    def _followed(
+        self, world_from_gripper: Float[np.ndarray, "4 4"]
+    ) -> Float[np.ndarray, " 7"] | None:
+        """Joint angles for a pose near to those now; where one is at its end, the elbow gives way.
+
+        Six numbers place the gripper: seven joints can move without it, by their Jacobian's null
+        space, and towards the middle of the range of the joint that is nearest to its end.
+        """
+        found = self._solution(world_from_gripper, self._q_rad)
+        if found is not None:
+            return found
+        jacobian = self._model.compute_single_link_local_jacobian(self._q_rad, self._pad_index)
+        still = np.linalg.svd(jacobian)[2][-1]
+        share = self._q_rad / LIMITS_RAD
+        worst = int(np.abs(share).argmax())
+        inwards = -still * np.sign(still[worst] * share[worst])
+        seeds = (self._q_rad + give * inwards for give in _GIVES_RAD)
+        solved = (self._solution(world_from_gripper, seed) for seed in seeds)
+        return next((q for q in solved if q is not None), None)
 
     def _to_drives(self, speed_rad_s: Float[np.ndarray, " 7"]) -> None:
         for joint, q, rate in zip(self._joints, self._q_rad, speed_rad_s, strict=True):

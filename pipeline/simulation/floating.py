@@ -7,7 +7,6 @@ import sapien
 from jaxtyping import Float
 
 from pipeline.config.evaluation import HandConfig
-from pipeline.control.clearance import STEM_BEGINS_M
 from pipeline.geometry.compiled_poses import quaternion_of
 
 HOME = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0.6], [0, 0, 0, 1]])
@@ -39,6 +38,10 @@ class Mover(Protocol):
         """Whether an entity is part of it."""
         ...
 
+    def joints_rad(self) -> Float[np.ndarray, " joints"]:
+        """Joint angles now; none where nothing but the gripper moves."""
+        ...
+
 
 class FloatingMover:
     """`Mover`: a capsule along the axis, above the soft pad, which is out of collision."""
@@ -46,7 +49,8 @@ class FloatingMover:
     def __init__(self, world: sapien.Scene, hand: HandConfig, table_side_m: float) -> None:
         self._half_m = table_side_m / 2
         self._radius_m = hand.stem_radius_m
-        self._half_length_m = (hand.length_m - STEM_BEGINS_M - 2 * hand.stem_radius_m) / 2
+        self._begins_m = hand.stem_begins_m
+        self._half_length_m = (hand.length_m - self._begins_m - 2 * hand.stem_radius_m) / 2
         self._rigid = sapien.physx.PhysxRigidDynamicComponent()
         material = sapien.physx.PhysxMaterial(STEM_FRICTION, STEM_FRICTION, 0.0)
         self._rigid.attach(
@@ -86,8 +90,12 @@ class FloatingMover:
         """The stem alone."""
         return bool(entity == self._entity)
 
+    def joints_rad(self) -> Float[np.ndarray, " joints"]:
+        """None."""
+        return np.empty(0)
+
     def _stem_pose(self) -> sapien.Pose:
         """The capsule's centre; a capsule lies along its x."""
-        above = STEM_BEGINS_M + self._radius_m + self._half_length_m
+        above = self._begins_m + self._radius_m + self._half_length_m
         centre = self._pose[:3, 3] + above * self._pose[:3, 2]
         return sapien.Pose(centre, quaternion_of(self._pose[:3, :3] @ _Z_FROM_X))

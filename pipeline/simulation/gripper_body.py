@@ -32,13 +32,17 @@ _LEVER_M = 0.2  # a turn counts as the way of a point this far from the axis
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """Things as they stood at the end of a control step. wrench : at the base, in GCS."""
+    """Things as they stood at the end of a control step.
+
+    wrench : at the base, in GCS. joints_rad : of the arm, empty where there is none.
+    """
 
     time_s: float
     world_from_gripper: Float[np.ndarray, "4 4"]
     world_from_object: dict[int, Float[np.ndarray, "4 4"]]
     wrench: Float[np.ndarray, " 6"]
     state: str
+    joints_rad: Float[np.ndarray, " joints"]
 
 
 class SuctionGripper:
@@ -281,7 +285,9 @@ class SuctionGripper:
     def _sample(self, wrench: Float[np.ndarray, " 6"]) -> None:
         """Add things as they stand to the trajectory."""
         poses = {i: body.world_from_object for i, body in self._bodies.items()}
-        self.samples.append(Sample(self.time_s, self.pose(), poses, wrench, str(self._state)))
+        joints = self._mover.joints_rad()
+        state = str(self._state)
+        self.samples.append(Sample(self.time_s, self.pose(), poses, wrench, state, joints))
 
     def _reach_m(self) -> float:
         return self._config.grasps.clearance_m

@@ -16,11 +16,10 @@ import numpy as np
 from jaxtyping import Float
 
 from pipeline.config.evaluation import HandConfig
-from pipeline.control.clearance import STEM_BEGINS_M
 
 FLANGE_M = 0.126
 GRIPPER_LINK = "pad"
-_HAND_MASS_KG = 0.6
+_FOOT_MASS_KG, _HAND_MASS_KG = 5.0, 0.6
 _CLEAR_M, _FOOT_M = 0.01, 0.12
 
 
@@ -50,6 +49,68 @@ AXES = (
 LIMITS_RAD = np.array([axis.limit_rad for axis in AXES])
 
 
+@dataclass(frozen=True)
+class LinkShape:
+    """A cylinder along its link's z from one place to another, or a ball where it has no length."""
+
+    link: str
+    radius_m: float
+    from_m: float
+    to_m: float
+
+    @property
+    def length_m(self) -> float:
+        """0 for a ball."""
+        return self.to_m - self.from_m
+
+    @property
+    def middle_m(self) -> float:
+        """Where its centre lies on the link's z."""
+        return (self.from_m + self.to_m) / 2
+
+
+# The first link begins above the foot: what turns must be clear of the table.
+LINKS = (
+    LinkShape("base", 0.09, _CLEAR_M, _FOOT_M),
+    *(
+        LinkShape(f"link{n}", axis.radius_m, _FOOT_M if n == 1 else 0.0, axis.d_m)
+        for n, axis in enumerate(AXES, start=1)
+    ),
+)
+"""The foot and the seven links, in the order of `link_poses`."""
+
+
+def link_poses(q_rad: Float[np.ndarray, "*t 7"]) -> Float[np.ndarray, "*t 8 4 4"]:
+    """base_from_link of the foot and the seven links in closed form, for any number of rows."""
+    poses = np.zeros((*q_rad.shape[:-1], len(LINKS), 4, 4))
+    poses[..., 0, :, :] = np.eye(4)
+    d_m, alpha_rad = 0.0, 0.0
+    for number, axis in enumerate(AXES, start=1):
+        turned = _before_from_link(d_m, alpha_rad, q_rad[..., number - 1])
+        poses[..., number, :, :] = poses[..., number - 1, :, :] @ turned
+        d_m, alpha_rad = axis.d_m, axis.alpha_rad
+    return poses
+
+
+def _before_from_link(
+    d_m: float, alpha_rad: float, q_rad: Float[np.ndarray, "*t"]
+) -> Float[np.ndarray, "*t 4 4"]:
+    """Along the last link's z, about its x, then by the joint about z: as the URDF's joints are."""
+    c, s = np.cos(q_rad), np.sin(q_rad)
+    ca, sa = math.cos(alpha_rad), math.sin(alpha_rad)
+    pose = np.zeros((*q_rad.shape, 4, 4))
+    pose[..., 0, 0], pose[..., 0, 1] = c, -s
+    pose[..., 1, 0], pose[..., 1, 1], pose[..., 1, 2] = ca * s, ca * c, -sa
+    pose[..., 2, 0], pose[..., 2, 1], pose[..., 2, 2] = sa * s, sa * c, ca
+    pose[..., 2, 3], pose[..., 3, 3] = d_m, 1.0
+    return pose
+
+
+def stem_shape(hand: HandConfig) -> LinkShape:
+    """The stem, along the flange's z to where the soft pad begins."""
+    return LinkShape("stem", hand.stem_radius_m, 0.0, hand.length_m - hand.stem_begins_m)
+
+
 def flange_pose(q_rad: Float[np.ndarray, " 7"]) -> Float[np.ndarray, "4 4"]:
     """base_from_flange in closed form: the product of the seven Denavit-Hartenberg matrices."""
     pose = np.eye(4)
@@ -68,8 +129,11 @@ def flange_pose(q_rad: Float[np.ndarray, " 7"]) -> Float[np.ndarray, "4 4"]:
 
 
 def flange_from_gripper(hand: HandConfig) -> Float[np.ndarray, "4 4"]:
-    """GCS on the flange: its z points back from the pad to the flange."""
-    pose = np.diag([1.0, -1.0, -1.0, 1.0])
+    """GCS on the flange: its z points back from the pad to the flange.
+
+    Its x, where the camera is, points away from the forearm where the last axis is at 0.
+    """
+    pose = np.diag([-1.0, 1.0, -1.0, 1.0])
     pose[2, 3] = hand.length_m
     return pose
 
@@ -77,14 +141,11 @@ def flange_from_gripper(hand: HandConfig) -> Float[np.ndarray, "4 4"]:
 def urdf(hand: HandConfig) -> str:
     """The arm with stem and pad, as URDF text."""
     robot = Xml.Element("robot", name="iiwa14")
-    _link(robot, "base", 5.0, 0.09, _CLEAR_M, _FOOT_M)
-    parent, d_m, alpha_rad = "base", 0.0, 0.0
-    for number, axis in enumerate(AXES, start=1):
-        name = f"link{number}"
-        # The first link begins above the foot: what turns must be clear of the table.
-        from_m = _FOOT_M if number == 1 else 0.0
-        _link(robot, name, axis.mass_kg, axis.radius_m, from_m, axis.d_m)
-        joint = _joint(robot, f"A{number}", "revolute", parent, name, d_m, alpha_rad)
+    _link(robot, LINKS[0], _FOOT_MASS_KG)
+    parent, d_m, alpha_rad = LINKS[0].link, 0.0, 0.0
+    for number, (axis, shape) in enumerate(zip(AXES, LINKS[1:], strict=True), start=1):
+        _link(robot, shape, axis.mass_kg)
+        joint = _joint(robot, f"A{number}", "revolute", parent, shape.link, d_m, alpha_rad)
         Xml.SubElement(joint, "axis", xyz="0 0 1")
         Xml.SubElement(
             joint,
@@ -94,28 +155,25 @@ def urdf(hand: HandConfig) -> str:
             effort=repr(float(axis.torque_nm)),
             velocity=repr(axis.speed_rad_s),
         )
-        parent, d_m, alpha_rad = name, axis.d_m, axis.alpha_rad
-    # The stem lies along the flange's z, from the flange to where the soft pad begins.
-    _link(robot, "stem", _HAND_MASS_KG, hand.stem_radius_m, 0.0, hand.length_m - STEM_BEGINS_M)
+        parent, d_m, alpha_rad = shape.link, axis.d_m, axis.alpha_rad
+    _link(robot, stem_shape(hand), _HAND_MASS_KG)
     _joint(robot, "flange", "fixed", parent, "stem", d_m, alpha_rad)
     Xml.SubElement(robot, "link", name=GRIPPER_LINK)
-    _joint(robot, "suction", "fixed", "stem", GRIPPER_LINK, hand.length_m, math.pi)
+    _joint(robot, "suction", "fixed", "stem", GRIPPER_LINK, hand.length_m, math.pi, math.pi)
     Xml.indent(robot)
     return Xml.tostring(robot, encoding="unicode")
 
 
-def _link(
-    robot: Xml.Element, name: str, mass_kg: float, radius_m: float, from_m: float, to_m: float
-) -> None:
-    """A link whose shape is a cylinder along its z, or a ball where it has no length."""
-    link = Xml.SubElement(robot, "link", name=name)
-    length = to_m - from_m
-    middle = f"0 0 {(from_m + to_m) / 2!r}"
+def _link(robot: Xml.Element, shape: LinkShape, mass_kg: float) -> None:
+    """A link of one shape, with its inertia."""
+    link = Xml.SubElement(robot, "link", name=shape.link)
+    radius_m, length_m = shape.radius_m, shape.length_m
+    middle = f"0 0 {shape.middle_m!r}"
     inertial = Xml.SubElement(link, "inertial")
     Xml.SubElement(inertial, "origin", xyz=middle, rpy="0 0 0")
     Xml.SubElement(inertial, "mass", value=repr(mass_kg))
-    if length > 0:
-        across = mass_kg * (3 * radius_m**2 + length**2) / 12
+    if length_m > 0:
+        across = mass_kg * (3 * radius_m**2 + length_m**2) / 12
         along = mass_kg * radius_m**2 / 2
     else:
         across = along = 0.4 * mass_kg * radius_m**2
@@ -130,11 +188,11 @@ def _link(
         iyz="0",
     )
     # No visuals: the worlds of the closed loop do not render.
-    shape = Xml.SubElement(link, "collision")
-    Xml.SubElement(shape, "origin", xyz=middle, rpy="0 0 0")
-    geometry = Xml.SubElement(shape, "geometry")
-    if length > 0:
-        Xml.SubElement(geometry, "cylinder", radius=repr(radius_m), length=repr(length))
+    collision = Xml.SubElement(link, "collision")
+    Xml.SubElement(collision, "origin", xyz=middle, rpy="0 0 0")
+    geometry = Xml.SubElement(collision, "geometry")
+    if length_m > 0:
+        Xml.SubElement(geometry, "cylinder", radius=repr(radius_m), length=repr(length_m))
     else:
         Xml.SubElement(geometry, "sphere", radius=repr(radius_m))
 
@@ -147,9 +205,11 @@ def _joint(
     child: str,
     along_m: float,
     about_x_rad: float,
+    about_z_rad: float = 0.0,
 ) -> Xml.Element:
     joint = Xml.SubElement(robot, "joint", name=name, type=kind)
     Xml.SubElement(joint, "parent", link=parent)
     Xml.SubElement(joint, "child", link=child)
-    Xml.SubElement(joint, "origin", xyz=f"0 0 {along_m!r}", rpy=f"{about_x_rad!r} 0 0")
+    turned = f"{about_x_rad!r} 0 {about_z_rad!r}"
+    Xml.SubElement(joint, "origin", xyz=f"0 0 {along_m!r}", rpy=turned)
     return joint

@@ -64,7 +64,8 @@ def strategy_of(name: PolicyName, predict: Predict, config: RunConfig) -> Strate
 def mover_of(world: sapien.Scene, config: RunConfig) -> Mover:
     """What `evaluate.robot` names."""
     if config.evaluate.robot == "iiwa14":
-        return ArmMover(world, config.evaluate.hand, config.evaluate.arm)
+        pad_radius_m = config.gripper.pad.radius_m
+        return ArmMover(world, config.evaluate.hand, config.evaluate.arm, pad_radius_m)
     return FloatingMover(world, config.evaluate.hand, config.scenes.table_side_m)
 
 

@@ -17,7 +17,7 @@ from pipeline.artifacts.scene_messages import read_scenes
 from pipeline.artifacts.sharding import listed_shards, read_index
 from pipeline.artifacts.training_messages import CHECKPOINT, EXPORT
 from pipeline.network.checkpoint import load_checkpoint_bytes
-from pipeline.network.export import OnnxPredictor
+from pipeline.network.control_inference import ControlPredictor
 from schemas.compatibility import read_released, versions
 from schemas.softgrip.v1.evaluation_pb2 import Attempt, LevelResult
 from schemas.softgrip.v1.grasps_pb2 import GraspBatch
@@ -76,11 +76,11 @@ def test_training(released: Path) -> None:
         result = artifact.one(TrainingResult)
         assert len(list(artifact.messages(Epoch))) == 2
         network = load_checkpoint_bytes(artifact.attachment(CHECKPOINT))
-        predictor = OnnxPredictor(artifact.attachment(EXPORT), threads=1)
+        predictor = ControlPredictor(artifact.attachment(EXPORT), threads=1)
     assert 0 < result.test_mae < 1
     assert network.config.layers == result.layers
     cloud = np.zeros((1, 24, 24, 3), dtype=np.float16)
-    (predicted,) = predictor.predict(cloud, np.ones((1, 24, 24), dtype=bool), 1)
+    (predicted,) = predictor.predict(cloud, np.ones((1, 24, 24), dtype=bool))
     assert 0 <= predicted <= 1
 
 

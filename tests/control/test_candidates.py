@@ -4,7 +4,7 @@ import numpy as np
 
 from pipeline.config import EvaluateConfig
 from pipeline.control.candidates import Candidates, candidates_at, sample_near
-from pipeline.control.clearance import STEM_BEGINS_M, free_of_collision
+from pipeline.control.clearance import free_of_collision
 from pipeline.control.cloud import Cloud, merged_cloud
 from pipeline.control.ranking import flattest_at_the_top, smoothed
 from pipeline.gripper.sampling import contact_frames
@@ -67,7 +67,7 @@ def test_a_post_beside_the_stem_is_in_the_way_of_one_pose_alone() -> None:
         np.array([[0.0, 0, 0], [0.025, 0, 0]]), np.tile([0, 0, 1.0], (2, 1)), np.zeros(2)
     )
     assert free_of_collision(poses, post, CONFIG.hand).tolist() == [True, False]
-    low = post[post[:, 2] < STEM_BEGINS_M - 0.005]
+    low = post[post[:, 2] < CONFIG.hand.stem_begins_m - 0.005]
     assert free_of_collision(poses, low, CONFIG.hand).all()
 
 

@@ -35,16 +35,21 @@ CLOSED = Strategy("closed-loop", near_corner, several_views=True, corrects=True,
 OPEN = replace(CLOSED, several_views=False, corrects=False, feels=False)
 
 
+def with_policy(**changes: float) -> EvaluateConfig:
+    return CONFIG.model_copy(update={"policy": CONFIG.policy.model_copy(update=changes)})
+
+
 def tried(
     points: np.ndarray,
     robot: FakeRobot,
     strategy: Strategy = CLOSED,
     pictures: int = 10_000,
     avoid_m: Sequence[np.ndarray] = (),
+    config: EvaluateConfig = CONFIG,
 ) -> tuple[Decision, FakeEyes]:
     eyes = FakeEyes(points, robot, pictures)
     rng = np.random.default_rng(0)
-    attempt = Attempt(eyes, robot, strategy, CONFIG, RADIUS_M, rng, avoid_m)
+    attempt = Attempt(eyes, robot, strategy, config, RADIUS_M, rng, avoid_m)
     return attempt.run(), eyes
 
 
@@ -269,10 +274,19 @@ def test_every_place_that_did_not_hold_is_told() -> None:
     assert len(decision.spoilt_m) == 1 + decision.regrasps == 1 + CONFIG.policy.regrasps
 
 
-def test_what_promises_nothing_is_no_second_try() -> None:
+@pytest.mark.parametrize(("least", "regrasps"), [(0.0, CONFIG.policy.regrasps), (0.1, 0)])
+def test_a_second_try_must_promise_enough(least: float, regrasps: int) -> None:
     def promises(_: Sequence[DepthPicture], candidates: Candidates) -> np.ndarray:
-        return np.full(len(candidates), 0.5 * CONFIG.policy.regrasp_quality)
+        return np.full(len(candidates), 0.05)
 
-    decision, _ = tried(plate(), FakeRobot(TOP_M, State.SEAL), replace(CLOSED, ranking=promises))
+    config = with_policy(regrasp_quality=least)
+    strategy = replace(CLOSED, ranking=promises)
+    decision, _ = tried(plate(), FakeRobot(TOP_M, State.SEAL), strategy, config=config)
     assert decision.cause is Cause.NO_SEAL
-    assert decision.regrasps == 0
+    assert decision.regrasps == regrasps
+
+
+def test_where_all_places_failed_before_they_are_tried_again() -> None:
+    small = plate() * [0.1, 0.1, 1.0]
+    decision, _ = tried(small, FakeRobot(TOP_M), OPEN, avoid_m=[np.array([0.0, 0.0, TOP_M])])
+    assert decision.cause is Cause.LIFTED

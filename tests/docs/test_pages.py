@@ -3,12 +3,14 @@
 import importlib
 import inspect
 import re
+from pathlib import Path
 
 import pytest
 import yaml
 
 from pipeline.artifacts import package_version
-from tests.docs.pages import PAGES, ROOT
+from pipeline.config import load_run_config
+from tests.docs.pages import PAGES, ROOT, blocks_of
 
 SCIENCE = (ROOT / "pipeline" / "README.md").read_text()
 ROWS = re.findall(r"^\| (.+?) \| .+ \| `(pipeline\.[\w.]+)` \|$", SCIENCE, flags=re.MULTILINE)
@@ -70,6 +72,13 @@ def test_goals_of_make_that_pages_name_exist() -> None:
     for page in PAGES:
         text = (ROOT / page).read_text()
         assert set(re.findall(r"(?:^|`)make ([a-z]+)", text, flags=re.MULTILINE)) <= goals
+
+
+@pytest.mark.parametrize("block", [block for page in PAGES for block in blocks_of(page, "toml")])
+def test_a_piece_of_run_toml_that_a_page_shows_is_one(block: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.toml"
+    path.write_text(block)
+    load_run_config(path)
 
 
 def test_readme_can_be_read_in_a_minute() -> None:

@@ -29,7 +29,7 @@ from pipeline.errors import SoftgripError
 from pipeline.geometry.mesh_files import load_mesh_file
 from pipeline.geometry.mesh_folders import MESH_SUFFIXES
 from pipeline.network.checkpoint import _digest, load_checkpoint_bytes
-from pipeline.network.export import OnnxPredictor
+from pipeline.network.control_inference import ControlPredictor
 from schemas.softgrip.v1.grasps_pb2 import GraspBatch, ShardIndex
 from schemas.softgrip.v1.objects_pb2 import CatalogueObject
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
@@ -86,7 +86,7 @@ def read_checkpoint(data: bytes) -> None:
     """A checkpoint as it is, one with its digest made right, or an exported network."""
     way, data = (data[0] % 3, data[1:]) if data else (0, data)
     if way == 2:
-        OnnxPredictor(data, threads=1)
+        ControlPredictor(data, threads=1)
     else:
         load_checkpoint_bytes(with_payload_digest(data) if way == 1 else data)
 

@@ -14,7 +14,8 @@ from pipeline.artifacts.training_messages import CHECKPOINT, EXPORT
 from pipeline.config.learning import NetworkConfig
 from pipeline.network.canonical import CHANNELS
 from pipeline.network.checkpoint import FORMAT, _digest, load_checkpoint_bytes
-from pipeline.network.export import OnnxPredictor, _metadata
+from pipeline.network.control_inference import ControlPredictor
+from pipeline.network.export import _metadata
 from tests.refusals import ROOT, assert_refused_cheaply
 
 CONFIG = NetworkConfig(layers=18, channels=(8, 8, 8, 8))
@@ -30,7 +31,7 @@ def load(path: Path) -> None:
         if CHECKPOINT in held:
             load_checkpoint_bytes(artifact.attachment(CHECKPOINT))
         if EXPORT in held:
-            OnnxPredictor(artifact.attachment(EXPORT), threads=1)
+            ControlPredictor(artifact.attachment(EXPORT), threads=1)
 
 
 def tensor(shape: Sequence[int], begin: int, end: int) -> dict[str, object]:
@@ -80,10 +81,11 @@ def model(
     nodes: Sequence[onnx.NodeProto],
     weights: Sequence[TensorProto] = (),
     sides: Sequence[int | str] = ("batch", 8),
+    gives: Sequence[int | str] | None = None,
 ) -> bytes:
-    """Marked as an export of ours; from ``x`` of these sides to ``q``."""
+    """Marked as an export of ours; from ``x`` of these sides to ``q`` of those."""
     inputs = [helper.make_tensor_value_info("x", TensorProto.FLOAT, sides)]
-    outputs = [helper.make_tensor_value_info("q", TensorProto.FLOAT, None)]
+    outputs = [helper.make_tensor_value_info("q", TensorProto.FLOAT, gives)]
     graph = helper.make_graph(nodes, "g", inputs, outputs, weights)
     made = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=10)
     for key, value in _metadata().items():
@@ -148,6 +150,9 @@ EXPORTS = {
     "doubled_batch": model(doublings(axis=0)),
     "padded": model(
         [node("Conv", "x", "w", pads=[2**20] * 4)], [ones(1, 1, 1, 1)], ("batch", 1, 24, 24)
+    ),
+    "cycle": model(
+        [node("Gemm", "x", "w", "b"), node("Relu", "q", to="b")], [ones(8, 8)], gives=("batch", 8)
     ),
     "given": model([node("Relu", "x")], sides=("batch", *TERABYTE)),
 }

@@ -14,11 +14,11 @@ FEW = planes_with_holes(5, seed=0)
 def test_each_batch_size_is_timed_at_its_size() -> None:
     sizes: list[int] = []
 
-    def predict(cloud: np.ndarray, mask: np.ndarray, size: int) -> np.ndarray:
-        assert len(cloud) == len(mask) == size
-        sizes.append(size)
+    def predict(cloud: np.ndarray, mask: np.ndarray) -> np.ndarray:
+        assert len(cloud) == len(mask)
+        sizes.append(len(cloud))
         time.sleep(0.004)
-        return np.zeros(size)
+        return np.zeros(len(cloud))
 
     figures = milliseconds_a_grasp(predict, FEW.cloud, FEW.mask, (1, 8), seconds=0.0)
     assert sizes == [1] * 4 + [8] * 4

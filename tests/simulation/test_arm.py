@@ -9,7 +9,14 @@ from pipeline.control.viewpoints import gripper_above
 from pipeline.geometry.transforms import invert
 from pipeline.simulation.arm import ArmMover
 from pipeline.simulation.engine import new_world, sapien_pose
-from pipeline.simulation.iiwa14 import AXES, LIMITS_RAD, flange_from_gripper, flange_pose
+from pipeline.simulation.iiwa14 import (
+    AXES,
+    LIMITS_RAD,
+    LINKS,
+    flange_from_gripper,
+    flange_pose,
+    link_poses,
+)
 
 HAND, ARM = HandConfig(), ArmConfig()
 UPRIGHT = np.eye(4)
@@ -17,7 +24,7 @@ UPRIGHT = np.eye(4)
 
 @pytest.fixture(scope="module")
 def arm() -> ArmMover:
-    return ArmMover(new_world(ScenesConfig(), render=False), HAND, ARM)
+    return ArmMover(new_world(ScenesConfig(), render=False), HAND, ARM, 0.025)
 
 
 def above(x: float, y: float, z: float) -> np.ndarray:
@@ -40,6 +47,11 @@ def test_urdf_articulation_and_pinocchio_agree_with_the_closed_form(
     expected[:3, 3] += ARM.base_m
     arm._articulation.set_qpos(q)
     np.testing.assert_allclose(arm.pose(), expected, atol=2e-6)
+    links = {link.name: link.entity_pose for link in arm._articulation.links}
+    for shape, pose in zip(LINKS, link_poses(q), strict=True):
+        np.testing.assert_allclose(links[shape.link].p, pose[:3, 3] + ARM.base_m, atol=2e-6)
+        turned = links[shape.link].to_transformation_matrix()[:3, :3]
+        np.testing.assert_allclose(turned, pose[:3, :3], atol=2e-6)
     arm._model.compute_forward_kinematics(q)
     found = arm._model.get_link_pose(arm._pad_index)
     np.testing.assert_allclose(found.p + np.array(ARM.base_m), expected[:3, 3], atol=2e-6)
@@ -64,7 +76,7 @@ def test_a_target_out_of_reach_is_refused(arm: ArmMover, place: tuple[float, ...
 
 def test_a_straight_line_is_followed_within_limits_of_speed_and_range() -> None:
     world = new_world(ScenesConfig(), render=False)
-    arm = ArmMover(world, HAND, ARM)
+    arm = ArmMover(world, HAND, ARM, 0.025)
     start, end = arm.pose(), above(-0.05, 0.15, 0.1)
     speeds, off_m, before = [], [], arm.joints_rad()
     steps = 360
@@ -85,7 +97,7 @@ def test_a_straight_line_is_followed_within_limits_of_speed_and_range() -> None:
 
 def test_too_fast_a_line_lags_rather_than_break_a_joint() -> None:
     world = new_world(ScenesConfig(), render=False)
-    arm = ArmMover(world, HAND, ARM)
+    arm = ArmMover(world, HAND, ARM, 0.025)
     far = above(-0.05, 0.3, 0.2)
     assert arm.drive(far)
     world.step()
@@ -94,6 +106,22 @@ def test_too_fast_a_line_lags_rather_than_break_a_joint() -> None:
         assert arm.drive(far)
         world.step()
     assert np.linalg.norm(arm.pose()[:3, 3] - far[:3, 3]) < 0.002
+
+
+def test_where_one_joint_comes_to_its_end_the_elbow_gives_way() -> None:
+    """From the first posture, the sixth joint alone would have to bend past its 120 degrees."""
+    world = new_world(ScenesConfig(), render=False)
+    arm = ArmMover(world, HAND, ARM, 0.025)
+    start, end = np.radians([[-30, 42, -5, -62, 20, 100, -44], [-42, 65, 4, -25, 20, 119, -42]])
+    goal = flange_pose(end) @ flange_from_gripper(HAND)
+    goal[:3, 3] += ARM.base_m
+    arm._articulation.set_qpos(start)
+    arm._q_rad = start
+    assert arm._solution(goal, start) is None
+    for _ in range(240):
+        assert arm.drive(goal)
+        world.step()
+    np.testing.assert_allclose(arm.pose(), goal, atol=0.003)
 
 
 def test_what_cannot_be_followed_is_said(arm: ArmMover) -> None:

@@ -7,12 +7,19 @@ import pytest
 import trimesh
 
 from pipeline.config import RunConfig
-from pipeline.config.evaluation import EvaluateConfig, RobotName, SuctionConfig
+from pipeline.config.evaluation import (
+    ArmConfig,
+    EvaluateConfig,
+    HandConfig,
+    RobotName,
+    SuctionConfig,
+)
 from pipeline.control.robot import Reading
 from pipeline.control.wrench_monitor import hanging_n
 from pipeline.gripper.pad import build_pad
 from pipeline.simulation.engine import add_body, new_world
 from pipeline.simulation.gripper_body import SuctionGripper
+from pipeline.simulation.iiwa14 import flange_from_gripper, flange_pose
 from pipeline.simulation.picking import mover_of
 from tests.bodies import catalogue_object, pose_at
 
@@ -82,6 +89,7 @@ def test_a_block_is_sealed_lifted_and_shaken(cache: Path) -> None:
     assert lifted(gripper)
     gripper.shake()
     assert gripper.lifted_m() >= 0.10
+    assert all(sample.joints_rad.size == 0 for sample in gripper.samples)
 
 
 def test_the_arm_lifts_the_same_block(cache: Path) -> None:
@@ -91,6 +99,10 @@ def test_the_arm_lifts_the_same_block(cache: Path) -> None:
     assert lifted(gripper)
     gripper.shake()
     assert gripper.lifted_m() >= 0.10
+    for sample in gripper.samples:
+        pose = flange_pose(sample.joints_rad) @ flange_from_gripper(HandConfig())
+        pose[:3, 3] += ArmConfig().base_m
+        np.testing.assert_allclose(sample.world_from_gripper, pose, atol=1e-5)
 
 
 def test_the_pad_stops_where_it_touches(cache: Path) -> None:

@@ -1,0 +1,133 @@
+"""Quality for control: an exported GA-CNN, run on the CPU by OpenVINO."""
+
+import sys
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float
+
+from pipeline.errors import ArtifactError, ContentError
+from pipeline.network.canonical import network_input
+from pipeline.network.export import INPUT_SHAPE, REMEDY, check_onnx_bytes
+from pipeline.network.ga_cnn import GaCnn
+from pipeline.network.inference import predict
+from pipeline.network.training import reproducible
+
+# Importing openvino tells Google Analytics and leaves an identifier in the home folder, except
+# where this package is missing.
+sys.modules["openvino_telemetry"] = None  # type: ignore[assignment]
+import openvino  # noqa: E402
+
+# What another runtime may change of a prediction: other orders of summation, no more.
+LARGEST_DIFFERENCE = 1e-4
+
+# Grasps a stream takes at a time. With 4 a grasp costs some 6 % more; with 16 some 4 % less, but
+# two streams are then unequally busy with the 48 candidates of a control step.
+_PART = 8
+# Grasps whose input is prepared together, while the streams run those before.
+_PREPARED = 32
+
+
+class ControlPredictor:
+    """An exported network, loaded and ready: what control asks for quality.
+
+    A grasp's quality is the same bytes whatever is asked with it, on any number of threads: each
+    part of a batch is of one size and run by one thread.
+    """
+
+    def __init__(self, data: bytes, threads: int) -> None:
+        """Load ``export_onnx_bytes``' bytes to run on ``threads`` threads of the CPU.
+
+        Raises
+        ------
+        ContentError : the bytes are no such export, or of another version.
+        """
+        check_onnx_bytes(data)
+        try:
+            compiled = _compiled(data, threads)
+        # Its messages may quote the bytes of a damaged model, which need not be text.
+        except (RuntimeError, UnicodeDecodeError) as error:
+            reason = str(error).strip().rpartition("\n")[2]
+            raise ContentError(f"exported network cannot be run: {reason}", REMEDY) from error
+        self._streams = openvino.AsyncInferQueue(compiled, threads)
+        self._streams.set_callback(_take_quality)
+
+    def predict(
+        self, cloud: Float[np.ndarray, "n h w 3"], mask: Bool[np.ndarray, "n h w"]
+    ) -> Float[np.ndarray, " n"]:
+        """Predicted quality q̂ in [0, 1]; clouds and masks as for ``inference.predict``."""
+        predicted = np.empty(len(cloud), dtype=np.float32)
+        # One thread prepares the input: on shared cores a second one costs more than it saves.
+        with reproducible(threads=1), torch.inference_mode():
+            for start in range(0, len(cloud), _PREPARED):
+                some = slice(start, start + _PREPARED)
+                inputs = network_input(torch.from_numpy(cloud[some]), torch.from_numpy(mask[some]))
+                self._start(inputs.numpy(), predicted[some])
+        self._streams.wait_all()
+        return predicted
+
+    def _start(
+        self, inputs: Float[np.ndarray, "n c h w"], predicted: Float[np.ndarray, " n"]
+    ) -> None:
+        """Hand inputs to the streams in parts, which fill ``predicted`` as they come to them."""
+        for start in range(0, len(inputs), _PART):
+            part = inputs[start : start + _PART]
+            if len(part) < _PART:
+                part = np.pad(part, ((0, _PART - len(part)), (0, 0), (0, 0), (0, 0)))
+            self._streams.start_async({0: part}, predicted[start : start + _PART])
+
+
+def checked_against(
+    predictor: ControlPredictor,
+    network: GaCnn,
+    cloud: Float[np.ndarray, "n h w 3"],
+    mask: Bool[np.ndarray, "n h w"],
+    batch_size: int,
+    threads: int,
+) -> float:
+    """Largest |q̂ of the export − q̂ of the network| over sample clouds.
+
+    batch_size, threads : of the network; the predictor has its own.
+
+    Raises
+    ------
+    ArtifactError : it exceeds 1e-4.
+    """
+    exported = predictor.predict(cloud, mask)
+    expected = predict(network, cloud, mask, batch_size, threads, average_symmetries=False)
+    difference = float(np.abs(exported - expected).max())
+    if not difference <= LARGEST_DIFFERENCE:
+        raise ArtifactError(
+            f"exported network differs from its original by {difference:.2g} in quality, "
+            f"more than {LARGEST_DIFFERENCE:.0e}",
+            REMEDY,
+        )
+    return difference
+
+
+def _compiled(data: bytes, threads: int) -> openvino.CompiledModel:
+    """A checked export for parts of one size, in as many streams of one thread each."""
+    core = openvino.Core()
+    model = core.read_model(data)
+    model.reshape([_PART, *INPUT_SHAPE])
+    compiled = core.compile_model(
+        model,
+        "CPU",
+        {
+            "NUM_STREAMS": threads,
+            "INFERENCE_NUM_THREADS": threads,
+            # Where the CPU has bfloat16 it would be taken.
+            "INFERENCE_PRECISION_HINT": "f32",
+            # Workers side by side would all be pinned to the same cores.
+            "ENABLE_CPU_PINNING": False,
+        },
+    )
+    given = [tuple(output.shape) for output in compiled.outputs]
+    if given != [(_PART,)]:
+        raise RuntimeError(f"of {_PART} grasps it gives {given}, not a quality each")
+    return compiled
+
+
+def _take_quality(request: openvino.InferRequest, into: Float[np.ndarray, " n"]) -> None:
+    """Keep a part's quality, without that of its padding."""
+    into[:] = request.get_output_tensor(0).data[: len(into)]

@@ -1,0 +1,112 @@
+"""Whether the arm, with its hand, would run into itself or the table: FCL on cylinders and balls.
+
+Links next to each other, or with one ball between them, share a joint: their shapes always overlap
+there, and the joint's range keeps the rest apart. The hand is one body with the last link.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations
+
+import fcl
+import numpy as np
+from jaxtyping import Float
+
+from pipeline.config.evaluation import HandConfig
+from pipeline.simulation.iiwa14 import (
+    FLANGE_M,
+    LINKS,
+    LinkShape,
+    flange_from_gripper,
+    link_poses,
+    stem_shape,
+)
+
+TABLE = "table"
+MARGIN_M = 0.01
+_NEAR = 2  # links this near along the chain share a joint
+_LAST = len(LINKS) - 1
+_HAND = len(LINKS)  # place of the hand in the chain
+_OFF_THE_TABLE = ("base", "link1", "pad")  # stands on it, or turns upright in place, or is soft
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A shape, the link it is fixed to, and where; ``place`` is along the chain."""
+
+    name: str
+    place: int
+    link: int
+    link_from_shape: Float[np.ndarray, "4 4"]
+    solid: fcl.CollisionObject
+
+
+class ArmClearance:
+    """The arm's shapes, each grown so that ``margin_m`` is kept between two, and to the table."""
+
+    def __init__(
+        self, hand: HandConfig, pad_radius_m: float, base_z_m: float, margin_m: float = MARGIN_M
+    ) -> None:
+        """base_z_m : of the arm's foot above the table."""
+        self._parts = _parts(hand, pad_radius_m, margin_m / 2)
+        self._pairs = [
+            (a, b) for a, b in combinations(self._parts, 2) if abs(a.place - b.place) > _NEAR
+        ]
+        self._above = [part for part in self._parts if part.name not in _OFF_THE_TABLE]
+        # A half space: beside the table is nothing to reach for either.
+        ground = fcl.Halfspace(np.array([0.0, 0.0, 1.0]), margin_m / 2 - base_z_m)
+        self._table = fcl.CollisionObject(ground, fcl.Transform())
+        self._request = fcl.CollisionRequest()
+
+    def is_free(self, q_rad: Float[np.ndarray, " 7"]) -> bool:
+        """Whether nothing meets."""
+        return next(self.meetings(q_rad), None) is None
+
+    def meetings(self, q_rad: Float[np.ndarray, " 7"]) -> Iterator[tuple[str, str]]:
+        """Names of what would meet at these joint angles, pair by pair."""
+        base_from_link = link_poses(q_rad)
+        for part in self._parts:
+            pose = base_from_link[part.link] @ part.link_from_shape
+            part.solid.setTransform(fcl.Transform(pose[:3, :3], pose[:3, 3]))
+        for first, second in self._pairs:
+            if self._meet(first.solid, second.solid):
+                yield first.name, second.name
+        for part in self._above:
+            if self._meet(part.solid, self._table):
+                yield part.name, TABLE
+
+    def _meet(self, first: fcl.CollisionObject, second: fcl.CollisionObject) -> bool:
+        return bool(fcl.collide(first, second, self._request, fcl.CollisionResult()))
+
+
+def _parts(hand: HandConfig, pad_radius_m: float, grown_m: float) -> list[_Part]:
+    """Links, stem, the soft pad as it is when free, and a ball around the camera."""
+    link_from_flange = _along_z(FLANGE_M)
+    link_from_gripper = link_from_flange @ flange_from_gripper(hand)
+    pad = LinkShape("pad", pad_radius_m, 0.0, hand.stem_begins_m)
+    camera = LinkShape("camera", hand.camera_radius_m, 0.0, 0.0)
+    camera_at = _along_z(hand.camera_above_m)
+    camera_at[0, 3] = hand.camera_aside_m
+    placed = [
+        *((shape, place, place, np.eye(4)) for place, shape in enumerate(LINKS)),
+        (stem_shape(hand), _HAND, _LAST, link_from_flange),
+        (pad, _HAND, _LAST, link_from_gripper),
+        (camera, _HAND, _LAST, link_from_gripper @ camera_at),
+    ]
+    return [
+        _Part(s.link, place, link, pose @ _along_z(s.middle_m), _solid(s, grown_m))
+        for s, place, link, pose in placed
+    ]
+
+
+def _solid(shape: LinkShape, grown_m: float) -> fcl.CollisionObject:
+    radius = shape.radius_m + grown_m
+    if shape.length_m > 0:
+        return fcl.CollisionObject(fcl.Cylinder(radius, shape.length_m + 2 * grown_m))
+    return fcl.CollisionObject(fcl.Sphere(radius))
+
+
+def _along_z(distance_m: float) -> Float[np.ndarray, "4 4"]:
+    pose = np.eye(4)
+    pose[2, 3] = distance_m
+    return pose
