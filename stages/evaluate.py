@@ -141,8 +141,8 @@ def publish(
     ordered = worst_first(attempts)
     shown = [ordered[i] for i in spread(len(ordered), stage.config.recording.attempts)]
     text = markdown(results.levels, results.policies, results.comparisons)
-    larger = stage.config.gripper.pad.radius_m / PadConfig().radius_m
-    view = blueprint(stage.config.evaluate.robot == "iiwa14", larger)
+    scale = stage.config.gripper.pad.radius_m / PadConfig().radius_m
+    view = blueprint(stage.config.evaluate.robot == "iiwa14", scale)
     with recording(stage.recording, stage.stage.name, stage.key.digest, view) as stream:
         show_attempts(stream, shown, names, meshes, text, shown_robot(stage.config))
     publish_bytes(stage.folder.path / "evaluate.md", text.encode())

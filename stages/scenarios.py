@@ -76,8 +76,9 @@ def tried(job: ScenarioJob) -> Row:
     scenario = SCENARIOS[job.index]
     config = seeing(job.config, scenario)
     strategy = strategy_of(job.policy, network(job.checkpoint).predict, config)
-    # The same scenes for every policy.
-    scenes = trials(scenario, job.trials, generator(config.seed, "scenario", scenario.name))
+    # The same scenes for every policy, and for the same things seen otherwise.
+    rng = generator(config.seed, "scenario", scenario.name.removesuffix(", segmented"))
+    scenes = trials(scenario, job.trials, rng)
     causes: Counter[str] = Counter()
     for scene, objects in scenes:
         rng = generator(config.seed, "attempt", scene.scene_id)

@@ -15,7 +15,7 @@ from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.posed_bodies import PosedBodies
 from pipeline.network.control_inference import ControlPredictor
 from pipeline.sensing.cameras import camera_at
-from pipeline.sensing.depth_by_rays import measured_depth, window_around
+from pipeline.sensing.depth_by_rays import measured, window_around
 from pipeline.simulation.eyes import gripper_from_camera, moved
 
 
@@ -53,7 +53,8 @@ def step_ms(
             camera = moved(on_wrist, pose @ gripper_from_camera(config.evaluate.hand))
             times: list[float] = [time.perf_counter()]
             window = window_around(camera, aim[:3, 3], config.evaluate.policy.look_m)
-            picture = DepthPicture(measured_depth(window, surfaces, None, rng), window)
+            depth_m, _ = measured(window, surfaces, None, rng)
+            picture = DepthPicture(depth_m, window)
             times.append(time.perf_counter())
             found = local.look(picture, aim)
             local.passed_on(aim)

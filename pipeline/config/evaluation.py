@@ -48,13 +48,16 @@ class HandConfig(Section):
         0.15, gt=0, le=2, description="where its axis meets the gripper's, below the pad [m]"
     )
     camera_radius_m: float = Field(
-        0.031, gt=0, le=0.2, description="ball around the camera, out of an arm's way; L515 [m]"
+        0.031,
+        gt=0,
+        le=0.2,
+        description="radius of the ball around the camera that an arm keeps clear of; L515 [m]",
     )
 
     @model_validator(mode="after")
     def _stem_is_there(self) -> Self:
-        if self.stem_begins_m >= self.length_m:
-            raise ValueError("stem_begins_m must be less than length_m")
+        if self.stem_begins_m + 2 * self.stem_radius_m >= self.length_m:
+            raise ValueError("length_m must exceed stem_begins_m + 2 stem_radius_m")
         return self
 
 
@@ -74,7 +77,12 @@ class PolicyConfig(Section):
 
     candidates: int = Field(128, ge=1, le=4096, description="u, sub clouds of the global phase")
     local_candidates: int = Field(48, ge=1, le=4096, description="u of each step on the way down")
-    wrist_views: int = Field(2, ge=0, le=8, description="looks of the wrist before the choice")
+    wrist_views: int = Field(
+        2,
+        ge=0,
+        le=8,
+        description="looks of the wrist before the choice; at what depth misses, two for one",
+    )
     wrist_view_m: float = Field(0.28, gt=0.05, le=2, description="pad above what it looks at [m]")
     tilt_max_rad: float = Field(
         math.radians(50), ge=0, lt=math.pi / 2, description="approach off the vertical [rad]"
@@ -94,10 +102,12 @@ class PolicyConfig(Section):
         0.03, ge=0, description="this near to the contact nothing is corrected any more [m]"
     )
     look_m: float = Field(
-        0.06, gt=0, description="looked at around the aim: a sub cloud, a correction more [m]"
+        0.06, gt=0, description="radius looked at around the aim: a sub cloud and a correction [m]"
     )
     another_m: float = Field(
-        0.03, ge=0, description="another place to grasp is at least so far from the last [m]"
+        0.03,
+        ge=0,
+        description="another place is at least so far from each given up in the attempt [m]",
     )
     retargets: int = Field(
         3, ge=0, description="how often another candidate may be taken after a closer look"
@@ -127,7 +137,7 @@ class PolicyConfig(Section):
         0.007, ge=0, description="q-hat is averaged over neighbours this near [m]"
     )
     avoid_radius_m: float = Field(
-        0.02, ge=0, description="no second try this near to a failed one [m]"
+        0.02, ge=0, description="no second try this near to a failed one while there is another [m]"
     )
     travel_m_s: float = Field(0.8, gt=0, le=3, description="speed in free space [m/s]")
     speed_m_s: float = Field(0.25, gt=0, le=2, description="speed of approach and lift [m/s]")

@@ -12,9 +12,9 @@ import operator
 import re
 import tomllib
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
-from pydantic import Field, ValidationError
+from pydantic import Field, ValidationError, model_validator
 
 from pipeline.config.cameras import CamerasConfig
 from pipeline.config.dataset import DatasetConfig
@@ -50,6 +50,12 @@ class RunConfig(Section):
     evaluate: EvaluateConfig = EvaluateConfig()
     recording: RecordingConfig = RecordingConfig()
     dataset: DatasetConfig = DatasetConfig()
+
+    @model_validator(mode="after")
+    def _stem_is_above_the_pad(self) -> Self:
+        if self.evaluate.hand.stem_begins_m < self.gripper.pad.altitude_m:
+            raise ValueError("evaluate.hand.stem_begins_m is within gripper.pad.altitude_m")
+        return self
 
 
 def load_run_config(path: Path) -> RunConfig:

@@ -86,22 +86,13 @@ class GlobalPhase:
         decision.candidates, decision.quality = found.world_from_contact, quality
         self._ranked = [
             *self._free(cloud, found, quality, best_first=quality),
-            *(Choice(pose, 0.0, felt_for=True) for pose in unseen),
+            *self._felt_for(cloud, unseen),
         ]
         return None if self._ranked else Cause.NO_CANDIDATE
 
     def best(self, least: float) -> Choice | None:
         """The best of what is left that promises at least so much and can be reached."""
-        for choice in self._ranked:
-            if choice.quality < least:
-                return None
-            place = choice.world_from_contact[:3, 3]
-            distance = [np.linalg.norm(place - aim) for aim in self._rejected_m]
-            if min(distance, default=np.inf) < self._policy.another_m:
-                continue
-            if self._can_reach(facing(choice.world_from_contact, self._robot.pose())):
-                return choice
-        return None
+        return self._first_of(self._ranked, least)
 
     def better_than(self, aim: Pose, quality: float) -> Choice | None:
         """A place elsewhere that promises at least so much; the aim is then rejected."""
@@ -111,9 +102,9 @@ class GlobalPhase:
             self._rejected_m.pop()
         return choice
 
-    def reject(self, aim: Pose) -> None:
-        """Nothing so near to this contact is to be aimed at again."""
-        self._rejected_m.append(aim[:3, 3])
+    def reject(self, places_m: Sequence[Float[np.ndarray, " 3"]]) -> None:
+        """Nothing near to these contacts is to be aimed at again."""
+        self._rejected_m += places_m
 
     def nearer_to(
         self,
@@ -121,7 +112,7 @@ class GlobalPhase:
         lever_m: float,
         pictures: Sequence[DepthPicture],
     ) -> Choice | None:
-        """A contact nearer to the line on which a load hangs; what else was ranked is forgotten.
+        """A contact nearer to the line on which a load hangs.
 
         lever_m : horizontal lever of the contact that did not hold.
         """
@@ -136,17 +127,14 @@ class GlobalPhase:
         worth = worth_with_lever(quality, found, place_m, lever_m, self._policy.regrasp_radius_m)
         nearer = worth > 0.0
         ranked = self._free(cloud, found.take(nearer), quality[nearer], best_first=worth[nearer])
-        if not ranked:
-            return None
-        self._ranked = ranked
-        return self.best(least=0.0)
+        return self._first_of(ranked, least=0.0)
 
     def _look_closer(
         self, pictures: Sequence[DepthPicture], travel: Travel
     ) -> list[DepthPicture] | Cause:
         """Pictures of the wrist's camera above the most promising places.
 
-        What depth does not show is looked at from two sides, where a look is left: opposite
+        For what depth does not show a look that is left becomes two, from opposite sides: the
         outlines lean over it alike, and its middle is between.
         """
         found = self._unspoilt(self._sampled(merged_cloud(pictures)))
@@ -170,6 +158,18 @@ class GlobalPhase:
             more.append(picture)
         return more
 
+    def _first_of(self, ranked: Sequence[Choice], least: float) -> Choice | None:
+        for choice in ranked:
+            if choice.quality < least:
+                continue
+            place = choice.world_from_contact[:3, 3]
+            distance = [np.linalg.norm(place - aim) for aim in self._rejected_m]
+            if min(distance, default=np.inf) < self._policy.another_m:
+                continue
+            if self._can_reach(facing(choice.world_from_contact, self._robot.pose())):
+                return choice
+        return None
+
     def _free(
         self,
         cloud: Cloud,
@@ -182,6 +182,14 @@ class GlobalPhase:
         free = free_of_collision(poses, cloud.points_m, self._config.hand)
         order = np.argsort(-best_first, kind="stable")
         return [Choice(poses[i], float(quality[i])) for i in order if free[i]]
+
+    def _felt_for(self, cloud: Cloud, contacts: Sequence[Pose]) -> list[Choice]:
+        """Those down to which the rigid parts meet nothing measured; what failed before, last."""
+        poses = np.array(contacts).reshape(-1, 4, 4)
+        free = free_of_collision(poses, cloud.points_m, self._config.hand)
+        fresh = [self._fresh(place) for place in poses[:, :3, 3]]
+        order = np.argsort(np.logical_not(fresh), kind="stable")
+        return [Choice(poses[i], 0.0, felt_for=True) for i in order if free[i]]
 
     def _sampled(self, cloud: Cloud) -> Candidates:
         return sample_candidates(

@@ -5,7 +5,7 @@ batch; those the robot cannot reach or that would collide are left out. Local ph
 camera looks again at every control step, and the contact is corrected, until the camera is too
 near; then straight on until contact. After that the wrench leads (Supplement VI): what the first
 tug shows not to hold is grasped once more, nearer to its centre where it hung askew and broke away,
-at the next best place where nothing hung at all. What colour shows and depth does not is felt for,
+else at the next best place. What colour shows and depth does not is felt for,
 straight down, where nothing better is left. What is needed of the world is in
 `pipeline.control.robot`; each way to end is in `pipeline.control.decision`.
 """
@@ -187,7 +187,7 @@ class Attempt:
         """Vacuum on, and the first bit of the lift: a held object pulls.
 
         What pulled and broke away was held too far from its centre of mass: nearer, once more.
-        Where nothing pulls the seal is bad: elsewhere, once more.
+        Where nothing pulled, or nothing is nearer: at the next best place, once more.
         """
         self._robot.vacuum(on=True)
         start = self._robot.pose()
@@ -220,7 +220,7 @@ class Attempt:
 
     def _aims_elsewhere(self) -> bool:
         """Whether a place is left that promises enough; then aim there."""
-        self._global.reject(self.decision.world_from_contact)
+        self._global.reject(self.decision.spoilt_m)
         return self._aims_at(self._global.best(self._policy.regrasp_quality))
 
     def _lift(self) -> Cause | None:

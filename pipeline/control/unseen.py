@@ -21,12 +21,13 @@ _MEASURED = 0.2  # an object is seen where this share of its pixels lies above t
 _CELL_M = 0.004
 _HIGHEST_M = 0.15
 _AROUND_M = 0.06  # the hull may lean this far over what the outline covers of the table
+_WIDEST_M = 1.0  # what an outline covers of the table, seen nearly level, is without bounds
 
 
 def unseen_contacts(pictures: Sequence[DepthPicture]) -> list[Float[np.ndarray, "4 4"]]:
     """A level contact on top of each object that depth does not show; world_from_contact.
 
-    Objects are told by the first picture's instances; pictures without instances tell nothing.
+    An object's pixels are counted over all pictures; those without instances tell nothing.
     """
     segmented = [picture for picture in pictures if picture.instances is not None]
     found = (hull_top(segmented, name) for name in unseen_instances(segmented))
@@ -34,7 +35,7 @@ def unseen_contacts(pictures: Sequence[DepthPicture]) -> list[Float[np.ndarray, 
 
 
 def unseen_instances(pictures: Sequence[DepthPicture]) -> list[int]:
-    """Instances of which, over all pictures, hardly a pixel was measured above the table."""
+    """Instances of whose pixels, over all pictures, too few were measured above the table."""
     shown: dict[int, int] = {}
     above: dict[int, int] = {}
     for picture in pictures:
@@ -53,7 +54,7 @@ def unseen_instances(pictures: Sequence[DepthPicture]) -> list[int]:
 def hull_top(pictures: Sequence[DepthPicture], name: int) -> Float[np.ndarray, "4 4"] | None:
     """The contact, level, over the middle of an instance's visual hull; None where there is none.
 
-    A picture that was cut off short of a place says nothing of it.
+    A picture that was cut off short of a place, or shows something before it, says nothing of it.
     """
     outlines = [(picture, _instances(picture) == name) for picture in pictures]
     outlines = [(picture, mask) for picture, mask in outlines if mask.any()]
@@ -86,8 +87,12 @@ def _places(picture: DepthPicture, mask: Bool[np.ndarray, "h w"]) -> Float[np.nd
         @ pose[:3, :3].T
     )
     down = rays[:, 2] < 0
+    if not down.any():
+        return np.empty((0, 3))
     on_table = pose[:2, 3] - rays[down, :2] * (pose[2, 3] / rays[down, 2])[:, None]
-    low, high = on_table.min(axis=0) - _AROUND_M, on_table.max(axis=0) + _AROUND_M
+    middle = np.median(on_table, axis=0)
+    low = np.maximum(on_table.min(axis=0) - _AROUND_M, middle - _WIDEST_M / 2)
+    high = np.minimum(on_table.max(axis=0) + _AROUND_M, middle + _WIDEST_M / 2)
     axes = [np.arange(low[axis], high[axis], _CELL_M) for axis in range(2)]
     heights = np.arange(_CELL_M / 2, _HIGHEST_M, _CELL_M)
     return np.stack(np.meshgrid(*axes, heights, indexing="ij"), axis=-1).reshape(-1, 3)
@@ -96,7 +101,7 @@ def _places(picture: DepthPicture, mask: Bool[np.ndarray, "h w"]) -> Float[np.nd
 def _within(
     picture: DepthPicture, mask: Bool[np.ndarray, "h w"], places_m: Float[np.ndarray, "n 3"]
 ) -> Bool[np.ndarray, " n"]:
-    """Whether a picture shows each place within the outline, or does not show it."""
+    """Whether a picture shows each place within the outline, or does not show it at all."""
     k = picture.camera.intrinsics
     x, y, z = transform_points(invert(picture.camera.world_from_camera), places_m).T
     column = np.floor(k[0, 0] * x / z + k[0, 2]).astype(np.int64)
@@ -104,7 +109,10 @@ def _within(
     height, width = mask.shape
     shown = (z > 0) & (row >= 0) & (row < height) & (column >= 0) & (column < width)
     inside = ~shown
-    inside[shown] = mask[row[shown], column[shown]]
+    row, column = row[shown], column[shown]
+    depth = picture.depth_m[row, column]
+    hidden = (_instances(picture)[row, column] != TABLE) & (depth > 0) & (depth < z[shown])
+    inside[shown] = mask[row, column] | hidden
     return np.asarray(inside)
 
 

@@ -31,19 +31,19 @@ CAMERAS = ("static_0", "wrist")
 STATES = ("observe", "pregrasp", "approach", "seal", "lift", "shake", "done")
 
 
-def blueprint(with_arm: bool = False, times: float = 1.0) -> rrb.Blueprint:
+def blueprint(with_arm: bool = False, scale: float = 1.0) -> rrb.Blueprint:
     """Opens on the worst failure; where an arm reaches in, from beside it.
 
-    times : how much larger all is than with the pad of Table I.
+    scale : of the pad against Table I's; without effect where an arm sets the view.
     """
-    from_m = (0.5, -1.05, 0.8) if with_arm else (-0.55 * times, -0.55 * times, 0.5 * times)
-    at_m = (-0.2, 0.0, 0.25) if with_arm else (0.0, 0.0, 0.08 * times)
+    eye_m = (0.5, -1.05, 0.8) if with_arm else (-0.55 * scale, -0.55 * scale, 0.5 * scale)
+    target_m = (-0.2, 0.0, 0.25) if with_arm else (0.0, 0.0, 0.08 * scale)
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Spatial3DView(
                 origin="/world",
                 name="Scene, gripper and its path, candidates by q-hat",
-                eye_controls=looking(from_m, at_m),
+                eye_controls=looking(eye_m, target_m),
             ),
             rrb.Vertical(
                 rrb.TextDocumentView(origin="/notes/attempt", name="Attempt"),

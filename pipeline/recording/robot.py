@@ -7,8 +7,8 @@ import rerun as rr
 from jaxtyping import Float, Int
 
 from pipeline.config.evaluation import ArmConfig, HandConfig
+from pipeline.geometry.iiwa14 import LINKS, LinkShape, link_poses
 from pipeline.recording import colours
-from pipeline.simulation.iiwa14 import LINKS, LinkShape, link_poses
 
 GRIPPER, ARM = "world/gripper", "world/arm"
 _PAD_M = 0.004  # thickness

@@ -17,13 +17,15 @@ from pipeline.sensing.depth_noise import disturb
 from pipeline.sensing.view import CameraView, normal_map
 
 
-def measured_depth(
+def measured(
     camera: PinholeCamera,
     scene: PosedScene,
     opaque: PosedScene | None,
     rng: np.random.Generator | None,
-) -> Float[np.ndarray, "h w"]:
-    """The depth image, 0 where nothing is measured.
+) -> tuple[Float[np.ndarray, "h w"], Int[np.ndarray, "h w"]]:
+    """The depth image, 0 where nothing is measured, and the body that each pixel shows.
+
+    Bodies are told by their ids, transparent or not; 0 is the table and nothing.
 
     opaque : what stands behind transparent bodies; None where there are none.
     rng : of the sensor's noise; None for an exact image.
@@ -31,12 +33,7 @@ def measured_depth(
     view = _exact(camera, scene)
     if opaque is not None:
         view = replace(view, behind_m=_exact(camera, opaque).depth_m)
-    return view.depth_m if rng is None else disturb(view, rng)
-
-
-def instances(camera: PinholeCamera, scene: PosedScene) -> Int[np.ndarray, "h w"]:
-    """The body that each pixel shows, transparent or not; 0 for the table and for nothing."""
-    return _exact(camera, scene).segmentation
+    return view.depth_m if rng is None else disturb(view, rng), view.segmentation
 
 
 def window_around(

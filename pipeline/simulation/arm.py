@@ -17,10 +17,11 @@ from pipeline.config.evaluation import ArmConfig, HandConfig
 from pipeline.control.viewpoints import gripper_above
 from pipeline.errors import SoftgripError
 from pipeline.geometry.compiled_poses import pose_of
+from pipeline.geometry.iiwa14 import AXES, LIMITS_RAD
 from pipeline.geometry.transforms import invert
 from pipeline.simulation.arm_clearance import ArmClearance
 from pipeline.simulation.engine import sapien_pose
-from pipeline.simulation.iiwa14 import AXES, GRIPPER_LINK, LIMITS_RAD, urdf
+from pipeline.simulation.iiwa14 import GRIPPER_LINK, urdf
 
 _STIFFNESS, _DAMPING = 4e4, 4e3  # of the joints' position drives [N m/rad, N m s/rad]
 _SPEEDS = np.array([axis.speed_rad_s for axis in AXES])
@@ -167,7 +168,7 @@ class ArmMover:
         inwards = -still * np.sign(still[worst] * share[worst])
         seeds = (self._q_rad + give * inwards for give in _GIVES_RAD)
         solved = (self._solution(world_from_gripper, seed) for seed in seeds)
-        return next((q for q in solved if q is not None), None)
+        return next((q for q in solved if q is not None and self._clearance.is_free(q)), None)
 
     def _to_drives(self, speed_rad_s: Float[np.ndarray, " 7"]) -> None:
         for joint, q, rate in zip(self._joints, self._q_rad, speed_rad_s, strict=True):

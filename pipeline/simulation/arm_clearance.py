@@ -13,14 +13,8 @@ import numpy as np
 from jaxtyping import Float
 
 from pipeline.config.evaluation import HandConfig
-from pipeline.simulation.iiwa14 import (
-    FLANGE_M,
-    LINKS,
-    LinkShape,
-    flange_from_gripper,
-    link_poses,
-    stem_shape,
-)
+from pipeline.geometry.iiwa14 import FLANGE_M, LINKS, LinkShape, link_poses
+from pipeline.simulation.iiwa14 import flange_from_gripper, stem_shape
 
 TABLE = "table"
 MARGIN_M = 0.01

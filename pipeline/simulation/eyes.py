@@ -13,7 +13,7 @@ from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.posed_bodies import PosedBodies
 from pipeline.geometry.transforms import look_at
 from pipeline.sensing.cameras import PinholeCamera, camera_at, static_cameras
-from pipeline.sensing.depth_by_rays import instances, measured_depth, window_around
+from pipeline.sensing.depth_by_rays import measured, window_around
 from pipeline.simulation.engine import Body
 
 _ORIGIN = np.zeros(3)
@@ -67,10 +67,9 @@ class SimulatedEyes:
             opaque = self._surfaces.at(
                 {i: pose for i, pose in poses.items() if i not in self._transparent}
             )
-        all_bodies = self._surfaces.at(poses)
-        depth = measured_depth(camera, all_bodies, opaque, self._rng)
+        depth_m, bodies = measured(camera, self._surfaces.at(poses), opaque, self._rng)
         segmented = self._config.evaluate.segmentation == "ideal"
-        return DepthPicture(depth, camera, instances(camera, all_bodies) if segmented else None)
+        return DepthPicture(depth_m, camera, bodies if segmented else None)
 
 
 def gripper_from_camera(hand: HandConfig) -> Float[np.ndarray, "4 4"]:

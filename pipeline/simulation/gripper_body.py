@@ -122,6 +122,7 @@ class SuctionGripper:
             self._joint = None
             return
         self.reached_pose = pose = self.pose()
+        self.target, self.reached_quality = 0, 0.0
         heights, below = pad_heights(pose[None], self.surfaces(), self._pad, self._reach_m())
         best = Holding(0.0, 0.0, 0.0, 0.0, 0.0)
         for body_id in (int(i) for i in np.unique(below[below > 0])):

@@ -172,7 +172,7 @@ def run_clutter(
     ):
         made = clutter.attempted(strategy, spoilt_m)
         attempts.append(made)
-        # What did not hold once is not tried again, whatever is lifted in between.
+        # What did not hold once is tried again only where nothing else is left.
         spoilt_m += made.decision.spoilt_m
         if made.cause is Cause.LIFTED:
             in_a_row = 0

@@ -56,10 +56,9 @@ SCENARIOS = (
 
 
 def seeing(config: RunConfig, scenario: Scenario) -> RunConfig:
-    """The run's configuration, with segmented pictures where the scenario has them."""
-    if not scenario.segmented:
-        return config
-    evaluate = config.evaluate.model_copy(update={"segmentation": "ideal"})
+    """The run's configuration, with segmented pictures where the scenario has them, only there."""
+    segmentation = "ideal" if scenario.segmented else "none"
+    evaluate = config.evaluate.model_copy(update={"segmentation": segmentation})
     return config.model_copy(update={"evaluate": evaluate})
 
 

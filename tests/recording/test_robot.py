@@ -9,11 +9,13 @@ from rerun.chunk import RrdReader
 
 from pipeline.artifacts.tensors import to_tensor
 from pipeline.config import RunConfig
+from pipeline.geometry.iiwa14 import LIMITS_RAD, LINKS
 from pipeline.recording.evaluate import blueprint, show_attempts
 from pipeline.recording.recording import recording
-from pipeline.simulation.iiwa14 import LIMITS_RAD, LINKS, flange_from_gripper, flange_pose
+from pipeline.simulation.iiwa14 import flange_from_gripper
 from schemas.softgrip.v1.evaluation_pb2 import Attempt
 from stages.evaluate import shown_robot
+from tests.simulation.kinematics import flange_pose
 
 CONFIG = RunConfig()
 ROBOT = shown_robot(CONFIG)

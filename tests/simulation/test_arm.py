@@ -6,17 +6,12 @@ import pytest
 from pipeline.config.evaluation import ArmConfig, HandConfig
 from pipeline.config.scenes import ScenesConfig
 from pipeline.control.viewpoints import gripper_above
+from pipeline.geometry.iiwa14 import AXES, LIMITS_RAD, LINKS, link_poses
 from pipeline.geometry.transforms import invert
 from pipeline.simulation.arm import ArmMover
 from pipeline.simulation.engine import new_world, sapien_pose
-from pipeline.simulation.iiwa14 import (
-    AXES,
-    LIMITS_RAD,
-    LINKS,
-    flange_from_gripper,
-    flange_pose,
-    link_poses,
-)
+from pipeline.simulation.iiwa14 import flange_from_gripper
+from tests.simulation.kinematics import flange_pose
 
 HAND, ARM = HandConfig(), ArmConfig()
 UPRIGHT = np.eye(4)

@@ -19,9 +19,10 @@ from pipeline.control.wrench_monitor import hanging_n
 from pipeline.gripper.pad import build_pad
 from pipeline.simulation.engine import add_body, new_world
 from pipeline.simulation.gripper_body import SuctionGripper
-from pipeline.simulation.iiwa14 import flange_from_gripper, flange_pose
+from pipeline.simulation.iiwa14 import flange_from_gripper
 from pipeline.simulation.picking import mover_of
 from tests.bodies import catalogue_object, pose_at
+from tests.simulation.kinematics import flange_pose
 
 BLOCK = (0.08, 0.08, 0.04)
 TOP_M = 0.04
