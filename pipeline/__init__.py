@@ -1,1 +1,12 @@
 """What the stages of softgrip are made of; imports nothing from ``stages``."""
+
+import os
+from pathlib import Path
+
+_CPU = Path("/proc/cpuinfo")
+
+# Matrix products in one order of summation, whatever the processor: OpenBLAS takes other kernels
+# where there is AVX-512, and a last bit that differs settles a clutter elsewhere. It reads this
+# when NumPy is imported; a choice made outside stands.
+if _CPU.is_file() and "avx2" in _CPU.read_text():
+    os.environ.setdefault("OPENBLAS_CORETYPE", "Haswell")

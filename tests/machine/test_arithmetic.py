@@ -1,0 +1,42 @@
+"""Sums come in one order on every processor that has AVX2."""
+
+import hashlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+CPU = Path("/proc/cpuinfo")
+PRODUCT = """
+import numpy as np
+a = np.random.default_rng(0).standard_normal((3, 40, 37))
+import hashlib
+print(hashlib.sha256((a[0] @ a[1].T @ a[2]).tobytes()).hexdigest())
+"""
+
+
+def product(before: str, kernels: str | None) -> str:
+    """Digest of a product of matrices in an interpreter of its own."""
+    env = {name: value for name, value in os.environ.items() if name != "OPENBLAS_CORETYPE"}
+    if kernels is not None:
+        env["OPENBLAS_CORETYPE"] = kernels
+    command = [sys.executable, "-c", before + PRODUCT]
+    done = subprocess.run(command, env=env, capture_output=True, text=True, check=True)
+    assert len(done.stdout.strip()) == len(hashlib.sha256().hexdigest())
+    return done.stdout
+
+
+@pytest.mark.skipif(
+    not CPU.is_file() or "avx2" not in CPU.read_text(), reason="this processor has no AVX2"
+)
+def test_products_are_those_of_one_kind_of_processor() -> None:
+    pinned = product("import pipeline\n", None)
+    assert pinned == product("", "Haswell")
+    # Kernels of another kind, which every such processor can run, sum in another order.
+    assert pinned != product("", "Sandybridge")
+
+
+def test_a_choice_made_outside_stands() -> None:
+    assert product("import pipeline\n", "Sandybridge") == product("", "Sandybridge")
