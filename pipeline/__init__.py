@@ -7,6 +7,6 @@ _CPU = Path("/proc/cpuinfo")
 
 # Matrix products in one order of summation, whatever the processor: OpenBLAS takes other kernels
 # where there is AVX-512, and a last bit that differs settles a clutter elsewhere. It reads this
-# when NumPy is imported; a choice made outside stands.
-if _CPU.is_file() and "avx2" in _CPU.read_text():
-    os.environ.setdefault("OPENBLAS_CORETYPE", "Haswell")
+# when NumPy is imported; a choice made outside stands, and workers inherit this one.
+if "OPENBLAS_CORETYPE" not in os.environ and _CPU.is_file() and "avx2" in _CPU.read_text():
+    os.environ["OPENBLAS_CORETYPE"] = "Haswell"

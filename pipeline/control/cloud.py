@@ -65,17 +65,6 @@ def merged_cloud(pictures: Sequence[DepthPicture], voxel_m: float = VOXEL_M) -> 
     return Cloud(means, eyes[first])
 
 
-def heights_m(picture: DepthPicture) -> Float[np.ndarray, "h w"]:
-    """Height above the table of what each pixel measured; NaN where nothing was."""
-    pose, k = picture.camera.world_from_camera, picture.camera.intrinsics
-    height, width = picture.depth_m.shape
-    x = (np.arange(width) + 0.5 - k[0, 2]) / k[0, 0]
-    y = (np.arange(height) + 0.5 - k[1, 2]) / k[1, 1]
-    slope = pose[2, 0] * x[None] + pose[2, 1] * y[:, None] + pose[2, 2]
-    depth = np.where(picture.depth_m > 0, picture.depth_m, np.nan)
-    return np.asarray(depth * slope + pose[2, 3])
-
-
 def _measured(picture: DepthPicture) -> Cloud:
     camera = picture.camera
     depth = np.ascontiguousarray(picture.depth_m, dtype=np.float64)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from pipeline.config.evaluation import EvaluateConfig
 from pipeline.control.candidates import Candidates, sample_candidates, sample_near
@@ -187,8 +187,7 @@ class GlobalPhase:
         """Those down to which the rigid parts meet nothing measured; what failed before, last."""
         poses = np.array(contacts).reshape(-1, 4, 4)
         free = free_of_collision(poses, cloud.points_m, self._config.hand)
-        fresh = [self._fresh(place) for place in poses[:, :3, 3]]
-        order = np.argsort(np.logical_not(fresh), kind="stable")
+        order = np.argsort(~self._fresh(poses[:, :3, 3]), kind="stable")
         return [Choice(poses[i], 0.0, felt_for=True) for i in order if free[i]]
 
     def _sampled(self, cloud: Cloud) -> Candidates:
@@ -213,15 +212,15 @@ class GlobalPhase:
 
     def _unspoilt(self, found: Candidates) -> Candidates:
         """Without those too near to a contact that failed before; all, where no other is left."""
-        places = found.world_from_contact[:, :3, 3]
-        fresh = np.array([self._fresh(place) for place in places], dtype=bool)
+        fresh = self._fresh(found.world_from_contact[:, :3, 3])
         return found.take(fresh) if fresh.any() else found
 
-    def _fresh(self, place_m: Float[np.ndarray, " 3"]) -> bool:
-        return all(
-            np.linalg.norm(place_m - contact) > self._policy.avoid_radius_m
-            for contact in self._avoid_m
-        )
+    def _fresh(self, places_m: Float[np.ndarray, "k 3"]) -> Bool[np.ndarray, " k"]:
+        fresh = np.ones(len(places_m), dtype=bool)
+        for contact in self._avoid_m:
+            distance = np.linalg.norm(places_m - contact, axis=1)
+            fresh &= distance > self._policy.avoid_radius_m
+        return fresh
 
     def _can_reach(self, contact: Pose) -> bool:
         above = backed_off(contact, self._policy.standoff_m)

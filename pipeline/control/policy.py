@@ -5,9 +5,9 @@ batch; those the robot cannot reach or that would collide are left out. Local ph
 camera looks again at every control step, and the contact is corrected, until the camera is too
 near; then straight on until contact. After that the wrench leads (Supplement VI): what the first
 tug shows not to hold is grasped once more, nearer to its centre where it hung askew and broke away,
-else at the next best place. What colour shows and depth does not is felt for,
-straight down, where nothing better is left. What is needed of the world is in
-`pipeline.control.robot`; each way to end is in `pipeline.control.decision`.
+else at the next best place. What colour shows and depth does not is felt for, straight down, where
+nothing better is left. What is needed of the world is in `pipeline.control.robot`; each way to end
+is in `pipeline.control.decision`.
 """
 
 from collections.abc import Callable, Sequence

@@ -7,13 +7,15 @@ table is such an object. Its outlines from several viewpoints bound it: the visu
 high, only at most: the pad goes down until it touches.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pipeline.control.cloud import TABLE_CLEARANCE_M, DepthPicture, heights_m
+from pipeline.control.cloud import TABLE_CLEARANCE_M, DepthPicture
 from pipeline.geometry.transforms import invert, transform_points
+from pipeline.sensing.cameras import pixel_rays, points_of_depth
 
 TABLE = 0  # instance of the table and of nothing
 _FEWEST_PIXELS = 30  # fewer say too little of an outline
@@ -36,14 +38,14 @@ def unseen_contacts(pictures: Sequence[DepthPicture]) -> list[Float[np.ndarray, 
 
 def unseen_instances(pictures: Sequence[DepthPicture]) -> list[int]:
     """Instances of whose pixels, over all pictures, too few were measured above the table."""
-    shown: dict[int, int] = {}
-    above: dict[int, int] = {}
+    shown: Counter[int] = Counter()
+    above: Counter[int] = Counter()
     for picture in pictures:
         instances = _instances(picture)
-        high = heights_m(picture) > TABLE_CLEARANCE_M
-        for name, count in zip(*np.unique(instances, return_counts=True), strict=True):
-            shown[int(name)] = shown.get(int(name), 0) + int(count)
-            above[int(name)] = above.get(int(name), 0) + int(high[instances == name].sum())
+        points, rows, columns = points_of_depth(picture.depth_m, picture.camera, every=1)
+        high = points[:, 2] > TABLE_CLEARANCE_M
+        shown.update(instances.ravel().tolist())
+        above.update(instances[rows[high], columns[high]].tolist())
     return [
         name
         for name, count in sorted(shown.items())
@@ -74,22 +76,11 @@ def hull_top(pictures: Sequence[DepthPicture], name: int) -> Float[np.ndarray, "
 
 def _places(picture: DepthPicture, mask: Bool[np.ndarray, "h w"]) -> Float[np.ndarray, "n 3"]:
     """Where the object may be: a grid over what its outline covers of the table, and around it."""
-    pose, k = picture.camera.world_from_camera, picture.camera.intrinsics
-    rows, columns = np.nonzero(mask)
-    rays = (
-        np.column_stack(
-            [
-                (columns + 0.5 - k[0, 2]) / k[0, 0],
-                (rows + 0.5 - k[1, 2]) / k[1, 1],
-                np.ones(len(rows)),
-            ]
-        )
-        @ pose[:3, :3].T
-    )
+    eye, rays = pixel_rays(picture.camera, mask)
     down = rays[:, 2] < 0
     if not down.any():
         return np.empty((0, 3))
-    on_table = pose[:2, 3] - rays[down, :2] * (pose[2, 3] / rays[down, 2])[:, None]
+    on_table = eye[:2] - rays[down, :2] * (eye[2] / rays[down, 2])[:, None]
     middle = np.median(on_table, axis=0)
     low = np.maximum(on_table.min(axis=0) - _AROUND_M, middle - _WIDEST_M / 2)
     high = np.minimum(on_table.max(axis=0) + _AROUND_M, middle + _WIDEST_M / 2)

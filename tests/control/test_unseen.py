@@ -8,12 +8,12 @@ import pytest
 
 from pipeline.config import EvaluateConfig
 from pipeline.control.candidates import Candidates
-from pipeline.control.cloud import DepthPicture, heights_m
+from pipeline.control.cloud import DepthPicture
 from pipeline.control.decision import Cause, Strategy
 from pipeline.control.policy import Attempt
 from pipeline.control.unseen import hull_top, unseen_contacts, unseen_instances
 from pipeline.geometry.transforms import look_at
-from pipeline.sensing.cameras import PinholeCamera
+from pipeline.sensing.cameras import PinholeCamera, points_of_depth
 from tests.control.fakes import FakeEyes, FakeRobot
 
 SIDE_M, TOP_M = 0.06, 0.05
@@ -61,7 +61,8 @@ AROUND = [(0.2, 0.0, 0.6), (-0.25, 0.0, 0.55), (0.0, 0.3, 0.6)]
 
 
 def test_the_table_is_at_height_zero_and_a_box_is_as_high_as_it_is() -> None:
-    heights = heights_m(picture((0.2, 0.1, 0.7), None, MIDDLE_M))
+    shown = picture((0.2, 0.1, 0.7), None, MIDDLE_M)
+    heights = points_of_depth(shown.depth_m, shown.camera, every=1)[0][:, 2]
     assert heights.min() == pytest.approx(0.0, abs=1e-9)
     assert heights.max() == pytest.approx(TOP_M, abs=1e-9)
 

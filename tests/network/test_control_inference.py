@@ -10,12 +10,10 @@ import onnxruntime
 import pytest
 import torch
 
-from pipeline.config.learning import NetworkConfig
 from pipeline.errors import ArtifactError, ContentError
 from pipeline.execution import run_in_order
 from pipeline.network.canonical import network_input
 from pipeline.network.control_inference import ControlPredictor, checked_against
-from pipeline.network.export import export_onnx_bytes
 from pipeline.network.ga_cnn import GaCnn, build_network
 from tests.network.planes import planes_with_holes
 from tests.network.test_hostile_checkpoints import model, node
@@ -23,17 +21,6 @@ from tests.network.test_inference import lively
 from tests.refusals import ROOT
 
 SAMPLES = planes_with_holes(70, seed=0)
-CONFIG = NetworkConfig(layers=18, channels=(16, 16, 32, 32))
-
-
-@pytest.fixture(scope="module")
-def network() -> GaCnn:
-    return lively(build_network(CONFIG, seed=0))
-
-
-@pytest.fixture(scope="module")
-def data(network: GaCnn) -> bytes:
-    return export_onnx_bytes(network)
 
 
 @pytest.fixture(scope="module")
@@ -62,8 +49,8 @@ def test_another_runtime_predicts_the_same(data: bytes, whole: np.ndarray) -> No
     np.testing.assert_allclose(whole, expected, rtol=0, atol=1e-4)
 
 
-def test_another_network_is_told_apart(data: bytes) -> None:
-    other = lively(build_network(CONFIG, seed=9))
+def test_another_network_is_told_apart(network: GaCnn, data: bytes) -> None:
+    other = lively(build_network(network.config, seed=9))
     with pytest.raises(ArtifactError, match="differs from its original"):
         checked_against(ControlPredictor(data, 1), other, SAMPLES.cloud, SAMPLES.mask, 30, 1)
 

@@ -5,23 +5,9 @@ from pathlib import Path
 import pytest
 
 import pipeline
-from pipeline.config.learning import NetworkConfig
 from pipeline.errors import ContentError
 from pipeline.network.export import check_onnx_bytes, export_onnx_bytes
-from pipeline.network.ga_cnn import GaCnn, build_network
-from tests.network.test_inference import lively
-
-CONFIG = NetworkConfig(layers=18, channels=(16, 16, 32, 32))
-
-
-@pytest.fixture(scope="module")
-def network() -> GaCnn:
-    return lively(build_network(CONFIG, seed=0))
-
-
-@pytest.fixture(scope="module")
-def data(network: GaCnn) -> bytes:
-    return export_onnx_bytes(network)
+from pipeline.network.ga_cnn import GaCnn
 
 
 def test_equal_networks_export_equal_bytes_without_a_word_of_the_machine(
