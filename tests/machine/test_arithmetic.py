@@ -33,6 +33,7 @@ def product(before: str, kernels: str | None) -> str:
 )
 def test_products_are_those_of_one_kind_of_processor() -> None:
     pinned = product("import pipeline\n", None)
+    assert pinned == product("import stages.scenes\n", None)
     assert pinned == product("", "Haswell")
     # Kernels of another kind, which every such processor can run, sum in another order.
     assert pinned != product("", "Sandybridge")
