@@ -155,7 +155,7 @@ def phases(bench: Bench) -> dict[str, object]:
     scene = bench.scenes[-1]
     rays, body_ids = ray_scene(scene, bench.meshes, config)
     view, rng = scene.views[0], np.random.default_rng(0)
-    surface = visible_surface(view, rays, body_ids)
+    surface = visible_surface(view, rays, body_ids, pad.radius_m)
     candidates, labels = label_rounds(surface, rays, body_ids, config, PHASE_GRASPS, rng)
     frames = candidates.world_from_contact
     order = np.argsort(body_ids)
@@ -193,7 +193,7 @@ def quadratic_programs(bench: Bench) -> dict[str, object]:
     heights, targets = [], []
     for scene in bench.scenes[-2:]:
         rays, body_ids = ray_scene(scene, bench.meshes, config)
-        surface = visible_surface(scene.views[0], rays, body_ids)
+        surface = visible_surface(scene.views[0], rays, body_ids, pad.radius_m)
         rng = np.random.default_rng(1)
         candidates, _ = label_rounds(surface, rays, body_ids, config, 1200, rng)
         for start in range(0, len(candidates), ROUND):
@@ -236,7 +236,7 @@ def worker_rate(job: WorkerJob) -> float:
     bench = opened(job.folder)
     config, scene = bench.config, bench.scenes[job.scene]
     rays, body_ids = ray_scene(scene, bench.meshes, config)
-    surface = visible_surface(scene.views[0], rays, body_ids)
+    surface = visible_surface(scene.views[0], rays, body_ids, config.gripper.pad.radius_m)
     rng = np.random.default_rng(job.scene)
     label_rounds(surface, rays, body_ids, config, ROUND, rng)
     started, labelled = time.perf_counter(), 0
@@ -283,6 +283,8 @@ def stored_samples(bench: Bench) -> Samples:
         shape_class=np.zeros(count, dtype=np.int64),
         level=np.ones(count, dtype=np.int64),
         pressure=np.concatenate([part.pressure for part in grasps]),
+        proposal_weight=np.ones(count),
+        pictures=np.ones(count, dtype=np.int64),
     )
 
 

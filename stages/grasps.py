@@ -11,7 +11,7 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact
 from pipeline.artifacts.grasp_messages import (
@@ -27,7 +27,7 @@ from pipeline.artifacts.object_messages import read_objects
 from pipeline.artifacts.scene_messages import read_placed, read_scene, scene_count
 from pipeline.artifacts.sharding import is_current, shard_entry, shard_path, write_index
 from pipeline.clutter.scene import ClutterScene, PlacedObject
-from pipeline.config import RunConfig
+from pipeline.config import RunConfig, SensingConfig
 from pipeline.errors import SceneError
 from pipeline.execution import (
     StageContext,
@@ -58,15 +58,16 @@ from pipeline.gripper.sampling import (
 from pipeline.recording.cost import Stopwatch, recording_cost
 from pipeline.recording.grasps import ShownGrasp, blueprint, show_grasps
 from pipeline.recording.recording import recording, spread
-from pipeline.sensing.cameras import pixel_rays
+from pipeline.sensing.cameras import PinholeCamera, pixel_rays, shown_whole
 from pipeline.sensing.depth_noise import disturb
-from pipeline.sensing.sub_cloud import sub_clouds
+from pipeline.sensing.sub_cloud import merged_sub_clouds
 from pipeline.sensing.view import CameraView
 from schemas.softgrip.v1.grasps_pb2 import DrapedPads, GraspBatch
 from stages.graph import GRASPS, inputs_of
 
 TOPIC, PADS_TOPIC = "/grasps", "/pads"
 RECORDED_SCENES = 4
+Picture = tuple[Float[np.ndarray, "h w"], PinholeCamera]  # depth [m], and what took it
 ROUND = 512  # grasps labelled at once: bounds the memory of their rays
 
 
@@ -195,10 +196,15 @@ def synthesize(
     names = tuple(sorted({item.object_name for item in placed}))
     rays, body_ids = surfaces
     index_of_body = {item.body_id: names.index(item.object_name) for item in placed}
+    # S-1.13 - S-1.15: the cameras' pictures, disturbed.
+    measured = [
+        (disturb(view, rng) if config.sensing.disturbed else view.depth_m, view.camera)
+        for view in scene.views
+    ]
     batches = []
     for number, view in enumerate(scene.views):
         share = wanted // len(scene.views) + (number < wanted % len(scene.views))
-        grasps = grasps_of_view(view, rays, body_ids, config, share, rng)
+        grasps = grasps_of_view(number, view, measured, rays, body_ids, config, share, rng)
         index = np.array([index_of_body[int(body)] for body in grasps.body_id], dtype=np.int64)
         origin = GraspOrigin(
             scene_id=scene.scene_id,
@@ -225,29 +231,28 @@ def ray_scene(
 
 
 def grasps_of_view(
+    number: int,
     view: CameraView,
+    measured: list[Picture],
     rays: RayScene,
     body_ids: np.ndarray,
     config: RunConfig,
     wanted: int,
     rng: np.random.Generator,
 ) -> LabelledGrasps:
-    """Propose, label, balance, and cut the sub clouds of what is kept."""
-    surface = visible_surface(view, rays, body_ids)
+    """Propose, label, balance, and cut the sub clouds of what is kept.
+
+    measured : the disturbed pictures of all views, this one's at ``number``.
+    """
+    surface = visible_surface(view, rays, body_ids, config.gripper.pad.radius_m)
     tried = int(np.ceil(wanted * config.grasps.oversampling))
     candidates, labels = label_rounds(surface, rays, body_ids, config, tried, rng)
     kept, probability = flattened(labels.q, wanted, config.grasps.balance, rng)
     candidates, labels = candidates.take(kept), labels.take(kept)
-    # S-1.13 - S-1.15: the camera's picture, disturbed, transformed, desampled.
-    measured = disturb(view, rng) if config.sensing.disturbed else view.depth_m
-    cloud, mask = sub_clouds(
-        measured,
-        view.camera,
-        candidates.world_from_contact,
-        config.sensing,
-        config.gripper.pad.radius_m,
-    )
-    first_touch = candidates.world_from_contact.copy()
+    merged = rng.random(len(kept)) < config.grasps.merged_share
+    frames, radius_m = candidates.world_from_contact, config.gripper.pad.radius_m
+    cloud, mask = cut_clouds(measured, number, frames, merged, config.sensing, radius_m)
+    first_touch = frames.copy()
     first_touch[:, :3, 3] += labels.touch_height_m[:, None] * first_touch[:, :3, 2]
     return LabelledGrasps(
         object_index=candidates.body_id,
@@ -267,7 +272,26 @@ def grasps_of_view(
         cloud=cloud,
         cloud_mask=mask,
         touch_height_m=labels.touch_height_m,
+        pictures=np.where(merged, len(measured), 1),
     )
+
+
+def cut_clouds(
+    measured: list[Picture],
+    number: int,
+    world_from_contact: Float[np.ndarray, "n 4 4"],
+    merged: Bool[np.ndarray, " n"],
+    sensing: SensingConfig,
+    radius_m: float,
+) -> tuple[Float[np.ndarray, "n g g 3"], Bool[np.ndarray, "n g g"]]:
+    """S-1.14, S-1.15: transform and desample, from all pictures where ``merged``, else from one."""
+    count, cells = len(merged), sensing.grid_cells
+    cloud = np.empty((count, cells, cells, 3), dtype=np.float32)
+    mask = np.empty((count, cells, cells), dtype=np.bool_)
+    for rows, pictures in ((merged, measured), (~merged, [measured[number]])):
+        frames = world_from_contact[rows]
+        cloud[rows], mask[rows] = merged_sub_clouds(pictures, frames, sensing, radius_m)
+    return cloud, mask
 
 
 def label_rounds(
@@ -280,7 +304,13 @@ def label_rounds(
 ) -> tuple[Candidates, LabelBatch]:
     """S-1.04 - S-1.12 in two rounds: over all that is seen, then near what is rare."""
     pad = pad_of(config)
-    bodies = np.unique(surface.body_id)
+    tried_on = surface.body_id[surface.contacts(config.grasps.seen_angle_max_rad)]
+    bodies = np.unique(tried_on)
+    if len(bodies) == 0:
+        raise SceneError(
+            "A camera sees no surface face on and whole in its picture",
+            "Raise grasps.seen_angle_max_rad, or change where the cameras stand",
+        )
     parts = {int(body): surface.of_body(body) for body in bodies}
     first = tried - int(tried * config.grasps.nearby_share)
     candidates = joined(
@@ -323,8 +353,13 @@ def label_candidates(
     return LabelBatch.joined(parts)
 
 
-def visible_surface(view: CameraView, rays: RayScene, body_ids: np.ndarray) -> VisibleSurface:
-    """What the camera sees of the objects: exact points and normals under its pixels."""
+def visible_surface(
+    view: CameraView, rays: RayScene, body_ids: np.ndarray, radius_m: float
+) -> VisibleSurface:
+    """What the camera sees of the objects: exact points and normals under its pixels.
+
+    radius_m : how far around a contact the picture must show the scene, r_G.
+    """
     origin, directions = pixel_rays(view.camera, view.segmentation > 0)
     hits = rays.cast(np.broadcast_to(origin, directions.shape), directions)
     body = np.where(hits.body >= 0, body_ids[hits.body], 0)
@@ -335,7 +370,8 @@ def visible_surface(view: CameraView, rays: RayScene, body_ids: np.ndarray) -> V
             "Change cameras.static.elevations_rad or azimuths_rad",
         )
     points = origin + hits.distance_m[seen, None] * directions[seen]
-    return VisibleSurface(points, rays.normals_at(hits)[seen], body[seen])
+    inside = shown_whole(view.camera, points, radius_m)
+    return VisibleSurface(points, rays.normals_at(hits)[seen], body[seen], origin, inside)
 
 
 def spread_evenly(total: int, parts: int) -> list[int]:

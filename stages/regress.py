@@ -79,7 +79,7 @@ def draw_pads(folder: RunFolder, path: Path) -> None:
     heights, targets = [], []
     for scene in read_scenes(folder.artifact("scenes")):
         rays, body_ids = ray_scene(scene, meshes, config)
-        surface = visible_surface(scene.views[0], rays, body_ids)
+        surface = visible_surface(scene.views[0], rays, body_ids, pad.config.radius_m)
         rng = generator(config.seed, "pads", scene.scene_id)
         candidates, labels = label_rounds(surface, rays, body_ids, config, 512, rng)
         wanted = np.linspace(labels.q.min(), labels.q.max(), PADS_A_SCENE)

@@ -19,7 +19,7 @@ from pipeline.artifacts.sharding import (
 from pipeline.clutter.levels import level_of
 from pipeline.errors import ArtifactError
 from pipeline.execution import StageContext, Summary, generator, progress, stage_command
-from pipeline.gripper.balancing import quality_histogram
+from pipeline.gripper.balancing import first_proposals, quality_histogram
 from pipeline.recording.recording import recording
 from pipeline.recording.shards import blueprint, show_samples
 from schemas.softgrip.v1.grasps_pb2 import GraspBatch, ShardEntry
@@ -78,6 +78,8 @@ def as_samples(message: GraspBatch, names: dict[str, int]) -> tuple[str, Samples
         shape_class=np.full(count, shape_class),
         level=np.full(count, origin.level),
         pressure=grasps.pressure.astype(np.float32),
+        proposal_weight=first_proposals(grasps.proposal, grasps.keep_probability),
+        pictures=grasps.pictures,
     )
 
 

@@ -31,6 +31,7 @@ from pipeline.network.figures import (
     error_by_class,
     error_by_quality_bin,
     mean_absolute_error,
+    weighted_error,
 )
 from pipeline.network.inference import predict
 from pipeline.network.parallel import ALONE, Ranks, joined_ranks
@@ -127,9 +128,12 @@ def test_figures(
         predicted=predicted,
         mae=mean_absolute_error(predicted, quality),
         mae_single=mean_absolute_error(single, quality),
+        mae_as_proposed=weighted_error(predicted, quality, test_set.proposal_weight),
         mean_predictor_mae=mean_predictor_mae(train_set.quality, quality),
+        mean_predictor_mae_as_proposed=mean_predictor_mae_as_proposed(train_set, test_set),
         seal_ratio_mae=mean_absolute_error(by_seal, quality),
         by_class=error_by_class(predicted, quality, shape_class),
+        by_pictures=error_by_class(predicted, quality, np.asarray(test_set.pictures)),
         count_by_class=dict(Counter(shape_class.tolist())),
         by_tenth=[found.mae for found in error_by_quality_bin(predicted, quality)],
         calibration=[
@@ -139,6 +143,16 @@ def test_figures(
         train_count=len(train_set),
         val_count=len(val_set),
     )
+
+
+def mean_predictor_mae_as_proposed(train_set: Samples, test_set: Samples) -> float | None:
+    """The mean predictor's error where both its mean and its error are over first proposals."""
+    weight = train_set.proposal_weight.astype(np.float64)
+    if not weight.sum() > 0:
+        return None
+    mean = np.average(train_set.quality, weights=weight)
+    constant = np.full(len(test_set), mean)
+    return weighted_error(constant, test_set.quality, test_set.proposal_weight)
 
 
 def export_for_control(stage: StageContext, trained: TrainedNetwork, test_set: Samples) -> bytes:
@@ -221,9 +235,12 @@ def summary(
         "val_mae": trained.val_mae,
         "test_mae": figures.mae,
         "test_mae_single": figures.mae_single,
+        "test_mae_as_proposed": figures.mae_as_proposed,
         "mean_predictor_mae": figures.mean_predictor_mae,
+        "mean_predictor_mae_as_proposed": figures.mean_predictor_mae_as_proposed,
         "seal_ratio_mae": figures.seal_ratio_mae,
         "test_mae_by_class": figures.by_class,
+        "test_mae_by_pictures": figures.by_pictures,
         "test_mae_by_tenth_of_q": figures.by_tenth,
         "device": chosen_device(stage.config.train.device, ranks).type,
         "processes": ranks.count,

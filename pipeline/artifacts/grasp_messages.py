@@ -28,6 +28,7 @@ STORED_AS = {
     "cloud": "f2",
     "cloud_mask": "u1",
     "touch_height_m": "f8",
+    "pictures": "u1",
 }
 SHAPES = {
     **dict.fromkeys(STORED_AS, "n"),
@@ -39,6 +40,8 @@ SHAPES = {
     "cloud": "n g g 3",
     "cloud_mask": "n g g",
 }
+# What the fields hold that v1 did not have from the start.
+UNLESS_THERE = {"pictures": 1}
 
 
 PADS_STORED_AS = {"grasp": "u4", "height_m": "f4", "pressure": "f4"}
@@ -57,6 +60,7 @@ class LabelledGrasps:
     tilt_rad, proposal, keep_probability : the sampler's bias.
     cloud, cloud_mask : (n, g, g, 3) and (n, g, g), units of r_G, origin at the contact.
     touch_height_m : (n,) first touch above the contact.
+    pictures : (n,) how many pictures the cloud was cut from: one, or all of the scene.
     """
 
     object_index: Int[np.ndarray, " n"]
@@ -76,6 +80,7 @@ class LabelledGrasps:
     cloud: Float[np.ndarray, "n g g 3"]
     cloud_mask: Bool[np.ndarray, "n g g"]
     touch_height_m: Float[np.ndarray, " n"]
+    pictures: Int[np.ndarray, " n"]
 
     def __len__(self) -> int:
         return len(self.quality)
@@ -124,7 +129,7 @@ def grasps_of(message: GraspBatch) -> tuple[GraspOrigin, LabelledGrasps]:
     ------
     ContentError : a tensor is missing, or they do not fit together.
     """
-    arrays = tensors_of(message, STORED_AS, SHAPES)
+    arrays = tensors_of(message, STORED_AS, SHAPES, UNLESS_THERE)
     if arrays["contact_mask"].shape[1] != -(-message.pad_vertices // 8):
         raise ContentError(f"A contact mask is not of {message.pad_vertices} pad vertices")
     if (arrays["object_index"] >= len(message.object_names)).any():

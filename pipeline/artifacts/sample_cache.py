@@ -24,7 +24,7 @@ from schemas.softgrip.v1.grasps_pb2 import ShardEntry
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 
 # Rises whenever the files of a cache change: one of another version is made again.
-CACHE_VERSION = 1
+CACHE_VERSION = 2
 _KEY_LENGTH = 24
 
 

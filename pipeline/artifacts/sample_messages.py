@@ -1,5 +1,6 @@
 """Training samples ↔ softgrip.v1.SampleBatch."""
 
+import math
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -16,12 +17,17 @@ STORED_AS = {
     "shape_class": "u1",
     "level": "u1",
     "pressure": "f4",
+    "proposal_weight": "f4",
+    "pictures": "u1",
 }
 SHAPES = {
     "cloud": "n g g 3",
     "cloud_mask": "n g g",
     **dict.fromkeys(("quality", "object_index", "shape_class", "level", "pressure"), "n"),
+    **dict.fromkeys(("proposal_weight", "pictures"), "n"),
 }
+# What the fields hold that v1 did not have from the start.
+UNLESS_THERE = {"proposal_weight": math.nan, "pictures": 1}
 
 
 @dataclass(frozen=True)
@@ -31,6 +37,10 @@ class Samples:
     cloud, cloud_mask : (n, g, g, 3) and (n, g, g), units of r_G, origin at the contact.
     quality, pressure : (n,) q and p. shape_class : (n,) 0 basic, 1 typical, 2 complex.
     object_index : (n,) into the catalogue's names, kept beside.
+    proposal_weight : (n,) how many grasps of the first round, drawn as S-1.04 - S-1.06 say and
+    before labels were balanced, a sample stands for; 0 for one proposed near a rare label. NaN
+    where the shards, of an older program, do not say.
+    pictures : (n,) how many pictures the cloud was cut from.
     """
 
     cloud: Float[np.ndarray, "n g g 3"]
@@ -40,6 +50,8 @@ class Samples:
     shape_class: Int[np.ndarray, " n"]
     level: Int[np.ndarray, " n"]
     pressure: Float[np.ndarray, " n"]
+    proposal_weight: Float[np.ndarray, " n"]
+    pictures: Int[np.ndarray, " n"]
 
     def __len__(self) -> int:
         return len(self.quality)
@@ -70,6 +82,6 @@ def samples_of(message: SampleBatch) -> Samples:
     ------
     ContentError : a tensor is missing, or they do not fit together.
     """
-    arrays = tensors_of(message, STORED_AS, SHAPES)
+    arrays = tensors_of(message, STORED_AS, SHAPES, UNLESS_THERE)
     arrays["cloud_mask"] = arrays["cloud_mask"].view(bool)
     return Samples(**arrays)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from types import MappingProxyType
 
 import numpy as np
 from google.protobuf.message import Message
@@ -64,11 +65,15 @@ def set_tensors(
 
 
 def tensors_of(
-    message: Message, stored_as: Mapping[str, str], shapes: Mapping[str, str]
+    message: Message,
+    stored_as: Mapping[str, str],
+    shapes: Mapping[str, str],
+    unless_there: Mapping[str, float] = MappingProxyType({}),
 ) -> dict[str, np.ndarray]:
     """Several tensors of a message, each of its dtype and all of shapes that fit together.
 
     shapes : field → sides such as ``"n g g 3"``; a letter is one length wherever it stands.
+    unless_there : fields that files of an older program lack → what they hold instead.
 
     Raises
     ------
@@ -76,7 +81,10 @@ def tensors_of(
     """
     arrays: dict[str, np.ndarray] = {}
     lengths: dict[str, int] = {}
+    absent = [name for name in unless_there if not message.HasField(name)]
     for name, dtype in stored_as.items():
+        if name in absent:
+            continue
         array = arrays[name] = from_tensor(getattr(message, name))
         sides = shapes[name].split()
         fits = array.ndim == len(sides) and all(
@@ -88,4 +96,7 @@ def tensors_of(
                 f"Tensor '{name}' is {array.dtype.str[1:]} of shape {array.shape}, "
                 f"expected {dtype} of ({', '.join(sides)}) with {lengths or 'any length'}"
             )
+    for name in absent:
+        shape = [lengths[side] for side in shapes[name].split()]
+        arrays[name] = np.full(shape, unless_there[name], dtype=np.dtype("<" + stored_as[name]))
     return arrays

@@ -22,8 +22,11 @@ class TestFigures:
 
     quality, predicted : (n,) q and q-hat. mae : mean |q-hat - q| of Supplement IV.
     mae_single : the same without averaging over the symmetries. count_by_class : samples.
+    mae_as_proposed, mean_predictor_mae_as_proposed : over grasps as the first round draws them
+    (`Samples.proposal_weight`), where labels are not balanced; None where that is unknown.
     train_count, val_count : samples that the network learned from and was chosen by.
     mean_predictor_mae, seal_ratio_mae : of the baselines. by_class : class name → error.
+    by_pictures : how many pictures a cloud was cut from → error.
     by_tenth : error by tenth of q, None where empty.
     calibration : by tenth of q-hat: mean q-hat, mean q (None where empty), count.
     """
@@ -34,9 +37,12 @@ class TestFigures:
     predicted: Float[np.ndarray, " n"]
     mae: float
     mae_single: float
+    mae_as_proposed: float | None
     mean_predictor_mae: float
+    mean_predictor_mae_as_proposed: float | None
     seal_ratio_mae: float
     by_class: dict[str, float]
+    by_pictures: dict[str, float]
     count_by_class: dict[str, int]
     by_tenth: Sequence[float | None]
     calibration: Sequence[tuple[float | None, float | None, int]]
@@ -68,6 +74,7 @@ def result_message(trained: TrainedNetwork, figures: TestFigures) -> TrainingRes
         mean_predictor_mae=figures.mean_predictor_mae,
         baseline_mae={"mean": figures.mean_predictor_mae, "seal_ratio": figures.seal_ratio_mae},
         test_mae_by_class=figures.by_class,
+        test_mae_by_pictures=figures.by_pictures,
         test_mae_by_tenth=to_tensor(_numbers(figures.by_tenth)),
         calibration=to_tensor(np.array([_numbers(row) for row in figures.calibration])),
         test_quality=to_tensor(figures.quality.astype(np.float32)),
@@ -77,6 +84,8 @@ def result_message(trained: TrainedNetwork, figures: TestFigures) -> TrainingRes
         test_count_by_class=figures.count_by_class,
         train_count=figures.train_count,
         val_count=figures.val_count,
+        test_mae_as_proposed=figures.mae_as_proposed,
+        mean_predictor_mae_as_proposed=figures.mean_predictor_mae_as_proposed,
     )
 
 

@@ -70,11 +70,24 @@ class GraspsConfig(Section):
     tilt_max_rad: float = Field(
         0.6, ge=0, lt=math.pi / 2, description="largest tilt of the approach off the normal [rad]"
     )
+    seen_angle_max_rad: float = Field(
+        math.radians(50),
+        gt=0,
+        le=math.pi / 2,
+        description="largest angle of the approach off the direction to the camera [rad]",
+    )
     normal_radius_m: float = Field(
         0.010, gt=0, description="surface normal is the mean over this radius [m]"
     )
     clearance_m: float = Field(
         0.15, gt=0, description="height above the contact from which the pad descends [m]"
+    )
+    merged_share: float = Field(
+        0.5,
+        ge=0,
+        le=1,
+        description="share of clouds cut from all pictures of the scene, as the global phase does; "
+        "the others from one, as on the way down [1]",
     )
     samples_per_message: int = Field(256, ge=1, le=8192)
 
@@ -86,5 +99,11 @@ class SensingConfig(Section):
     grid_cells: int = Field(24, ge=8, le=128, description="cells a side; Supplement III: 24")
     grid_side_m: float = Field(0.06, gt=0, description="side of the square around the pad [m]")
     grid_depth_m: float = Field(
-        0.03, gt=0, description="points farther than this from the contact along z are clipped [m]"
+        0.03, gt=0, description="points farther than this below the contact are left out [m]"
+    )
+    grid_height_m: float = Field(
+        0.15, gt=0, description="points farther than this above the contact are left out [m]"
+    )
+    layer_m: float = Field(
+        0.005, gt=0, description="a cell holds the mean of its points this near its highest [m]"
     )

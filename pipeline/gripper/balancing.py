@@ -9,6 +9,8 @@ subset whose histogram is nearer to flat. Both leave their mark in the sample
 import numpy as np
 from jaxtyping import Float, Int
 
+from pipeline.gripper.sampling import Proposal
+
 TENTHS = 10
 
 
@@ -52,6 +54,18 @@ def flattened(
     )
     kept.sort()
     return kept, (quota / np.maximum(there, 1))[tenths[kept]]
+
+
+def first_proposals(
+    proposal: Int[np.ndarray, " n"], keep_probability: Float[np.ndarray, " n"]
+) -> Float[np.ndarray, " n"]:
+    """How many grasps of the first round each kept grasp stands for.
+
+    With these weights a mean over kept grasps is one over grasps as S-1.04 - S-1.06 draw them:
+    those proposed near rare labels weigh nothing, the others by how few of their tenth were kept.
+    """
+    first = proposal != Proposal.NEARBY
+    return np.where(first, 1.0 / np.maximum(keep_probability, 1e-12), 0.0)
 
 
 def _quota(there: Int[np.ndarray, " 10"], wanted: int, balance: float) -> Int[np.ndarray, " 10"]:

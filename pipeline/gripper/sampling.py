@@ -1,18 +1,21 @@
 """Where grasps are tried: contacts, approach directions and poses, S-1.04 - S-1.06.
 
 A contact c is a point of the object's surface that the camera can see, for a
-grasp is only ever tried on what was observed. The approach d_G is the mean
-surface normal around c, as the policy estimates it (Supplement VI), tilted off
-it for part of the proposals; the spin about d_G is uniform. A second round
-proposes near grasps whose labels are rare, for labels fall from a full seal to
-none within a few millimetres. Which rule proposed a grasp is kept with it.
+grasp is only ever tried on what was observed; and where the camera sees what
+the pad would meet: around c the picture does not end, and d_G is not far off
+the direction to the camera, from where half the surface under the pad would be
+hidden. The approach d_G is the mean surface normal around c, as the policy
+estimates it (Supplement VI), tilted off it for part of the proposals; the spin
+about d_G is uniform. A second round proposes near grasps whose labels are
+rare, for labels fall from a full seal to none within a few millimetres. Which
+rule proposed a grasp is kept with it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
 
 from pipeline.config.grasps import GraspsConfig
@@ -31,17 +34,43 @@ class VisibleSurface:
     """Points of the objects that a camera sees, in WCS.
 
     points_m : (n, 3) on the true surface. normals : (n, 3) unit, outward.
-    body_id : (n,) which object a point lies on.
+    body_id : (n,) which object a point lies on. eye_m : (3,) where the camera is.
+    inside : (n,) the picture shows all around the point, as far as the pad reaches.
     """
 
     points_m: Float[np.ndarray, "n 3"]
     normals: Float[np.ndarray, "n 3"]
     body_id: Int[np.ndarray, " n"]
+    eye_m: Float[np.ndarray, " 3"]
+    inside: Bool[np.ndarray, " n"]
 
     def of_body(self, body_id: int) -> "VisibleSurface":
         """The part that lies on one object."""
         mine = self.body_id == body_id
-        return VisibleSurface(self.points_m[mine], self.normals[mine], self.body_id[mine])
+        return replace(
+            self,
+            points_m=self.points_m[mine],
+            normals=self.normals[mine],
+            body_id=self.body_id[mine],
+            inside=self.inside[mine],
+        )
+
+    def contacts(self, angle_max_rad: float) -> Int[np.ndarray, " k"]:
+        """Indices of the points where a pad may be tried: whole in the picture, seen face on."""
+        return np.flatnonzero(
+            self.inside & self.seen_face_on(self.points_m, self.normals, angle_max_rad)
+        )
+
+    def seen_face_on(
+        self,
+        points_m: Float[np.ndarray, "k 3"],
+        approach: Float[np.ndarray, "k 3"],
+        angle_max_rad: float,
+    ) -> Bool[np.ndarray, " k"]:
+        """Which unit approaches are within the angle off the direction to the camera."""
+        to_eye = self.eye_m - points_m
+        cosine = np.einsum("ij,ij->i", approach, to_eye) / _lengths(to_eye)
+        return np.asarray(cosine >= np.cos(angle_max_rad))
 
 
 @dataclass(frozen=True)
@@ -87,13 +116,18 @@ def propose(
 
     S-1.04 draws the contact c, S-1.05 the approach d_G, S-1.06 the spin about it.
 
-    surface : points of that object alone, at least one.
+    surface : points of that object alone, with at least one of its `contacts`.
     """
-    at = rng.integers(len(surface.points_m), size=count)
+    contacts = surface.contacts(config.seen_angle_max_rad)
+    at = contacts[rng.integers(len(contacts), size=count)]
     normals = mean_normals(surface, surface.points_m[at], config.normal_radius_m)
     tilted = rng.random(count) >= config.normal_share
     tilt = np.where(tilted, rng.uniform(0.0, config.tilt_max_rad, count), 0.0)
     approach = tilt_directions(normals, tilt, rng)
+    # Turned too far from the camera: take the normal itself.
+    hidden = ~surface.seen_face_on(surface.points_m[at], approach, config.seen_angle_max_rad)
+    approach = np.where(hidden[:, None], normals, approach)
+    tilt = np.where(hidden, 0.0, tilt)
     return Candidates(
         contact_frames(surface.points_m[at], approach, rng.uniform(0, 2 * np.pi, count)),
         surface.body_id[at],
@@ -110,29 +144,30 @@ def propose_nearby(
 ) -> Candidates:
     """Second round: a small step of contact and approach from each of ``grasps``.
 
-    surface : points of the object that all ``grasps`` are on. The new contact is a visible
-    surface point within ``config.nearby_radius_m`` of the old one (the old one itself where
+    surface : points of the object that all ``grasps`` are on. The new contact is one of its
+    `contacts` within ``config.nearby_radius_m`` of the old one (the old one itself where
     none is), the new approach within ``config.nearby_tilt_rad`` of the old approach.
     """
     count = len(grasps)
+    contacts = surface.points_m[surface.contacts(config.seen_angle_max_rad)]
     old = grasps.world_from_contact[:, :3, 3]
     offset = rng.normal(size=(count, 3))
     offset *= (config.nearby_radius_m * np.cbrt(rng.random(count)) / _lengths(offset))[:, None]
-    distance, nearest = cKDTree(surface.points_m).query(old + offset)
-    contact = np.where(
-        (distance <= config.nearby_radius_m)[:, None], surface.points_m[nearest], old
-    )
+    distance, nearest = cKDTree(contacts).query(old + offset)
+    contact = np.where((distance <= config.nearby_radius_m)[:, None], contacts[nearest], old)
     step = rng.uniform(0.0, config.nearby_tilt_rad, count)
     approach = tilt_directions(grasps.world_from_contact[:, :3, 2], step, rng)
     normals = mean_normals(surface, contact, config.normal_radius_m)
     cosine = np.clip(np.einsum("ij,ij->i", normals, approach), -1.0, 1.0)
     tilt = np.arccos(cosine)
     # Off by more than the first round may be: take the normal itself.
-    approach = np.where((tilt <= config.tilt_max_rad)[:, None], approach, normals)
+    may = tilt <= config.tilt_max_rad
+    may &= surface.seen_face_on(contact, approach, config.seen_angle_max_rad)
+    approach = np.where(may[:, None], approach, normals)
     return Candidates(
         contact_frames(contact, approach, rng.uniform(0, 2 * np.pi, count)),
         grasps.body_id,
-        np.where(tilt <= config.tilt_max_rad, tilt, 0.0),
+        np.where(may, tilt, 0.0),
         np.full(count, Proposal.NEARBY),
     )
 

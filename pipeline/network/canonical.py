@@ -20,12 +20,17 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from pipeline.network.measured_drape import draped_gap
+from pipeline.network.measured_drape import CELL, draped_gap
 
-# What the input's channels hold, in order.
-CHANNELS = ("x", "y", "z", "z_fine", "radius", "seen", "gap", "contact")
-INPUT_CHANNELS = len(CHANNELS)
-X_CHANNEL, Y_CHANNEL = CHANNELS.index("x"), CHANNELS.index("y")
+# What the input's channels hold, in order; pairs that turn with the cloud stand first.
+Channels = tuple[str, ...]
+CHANNELS: Channels = (
+    *("x", "y", "x_in_cell", "y_in_cell"),
+    *("z", "z_fine", "radius", "seen", "pad_gap", "pad_contact"),
+)
+# Networks of version 0.1.0 were trained on these.
+CHANNELS_0_1: Channels = ("x", "y", "z", "z_fine", "radius", "seen", "gap", "contact")
+KNOWN_CHANNELS = (CHANNELS, CHANNELS_0_1)
 
 # H / r_G of Table I: the pad reaches no further down than its altitude, so what lies deeper is
 # deep and nothing more.
@@ -33,6 +38,8 @@ Z_LIMIT = 1.2
 # A seal is lost to steps of a few millimetres, Delta_d of Table I: the finer channel spreads
 # +-0.16 r_G = +-4 mm over [-1, 1] so that the first convolution need not.
 Z_FINE_LIMIT = 0.16
+# The pad ends at r_G. What a cell beyond it holds, by its measured place, holds no pad up.
+PAD_RADIUS = 1.0
 # A cell this near the draped pad counts as in contact: half a millimetre, what noise leaves of the
 # label's 0.1 mm.
 CONTACT_GAP = 0.02
@@ -43,7 +50,7 @@ SYMMETRIES = 8
 
 
 def network_input(
-    cloud: Float[Tensor, "b h w 3"], mask: Bool[Tensor, "b h w"]
+    cloud: Float[Tensor, "b h w 3"], mask: Bool[Tensor, "b h w"], channels: Channels = CHANNELS
 ) -> Float[Tensor, "b c h w"]:
     """Canonical input of GA-CNN.
 
@@ -51,30 +58,47 @@ def network_input(
     ----------
     cloud : points in GCS, in units of r_G; unseen cells may hold anything finite or not.
     mask : cells that hold a measured point.
+    channels : one of ``KNOWN_CHANNELS``: a network's own.
 
     Returns
     -------
-    Channels as in ``CHANNELS``, single precision: x, y as measured; z from the reference height,
-    bounded to ±1.2 (H / r_G); the same bounded to ±0.16 and stretched to ±1; distance from the
-    axis; 1 where seen; how far the pad draped on the cloud stays above (see `measured_drape`),
-    in units of the fine channel; 1 where it touches. Unseen cells are zero in every channel.
+    Channels in single precision, zero in unseen cells:
+
+    - ``x``, ``y`` as measured; ``x_in_cell``, ``y_in_cell`` how far they are off the cell's
+      middle, ±1 at its border, which tells where in the cell an edge runs;
+    - ``z`` from the reference height, bounded to ±1.2 (H / r_G); ``z_fine`` the same bounded to
+      ±0.16 and stretched to ±1;
+    - ``radius``, the distance from the axis; ``seen``, 1;
+    - ``pad_gap``, how far the pad draped on the cloud stays above (see `measured_drape`), in units
+      of the fine channel, and ``pad_contact``, 1 where it touches; 0 where there is no pad.
+      ``gap`` and ``contact`` are of a pad as large as the grid.
     """
     seen = mask.unsqueeze(-1)
     points = torch.where(seen, cloud.float(), 0.0)
     x, y, z = points.unbind(-1)
     z = torch.where(mask, z - reference_height(z, mask)[:, None, None], 0.0)
-    gap = draped_gap(z, mask)
-    channels = (
-        x,
-        y,
-        z.clamp(-Z_LIMIT, Z_LIMIT),
-        z.clamp(-Z_FINE_LIMIT, Z_FINE_LIMIT) / Z_FINE_LIMIT,
-        torch.sqrt(x * x + y * y),
-        mask.float(),
-        gap / Z_FINE_LIMIT,
-        (mask & (gap <= CONTACT_GAP)).float(),
-    )
-    return torch.stack(channels, dim=1)
+    radius = torch.sqrt(x * x + y * y)
+    found = {
+        "x": x,
+        "y": y,
+        "z": z.clamp(-Z_LIMIT, Z_LIMIT),
+        "z_fine": z.clamp(-Z_FINE_LIMIT, Z_FINE_LIMIT) / Z_FINE_LIMIT,
+        "radius": radius,
+        "seen": mask.float(),
+    }
+    if "x_in_cell" in channels:
+        middles = (torch.arange(z.shape[1], device=z.device) - (z.shape[1] - 1) / 2) * CELL
+        found["x_in_cell"] = torch.where(mask, (x - middles) / (CELL / 2), 0.0)
+        found["y_in_cell"] = torch.where(mask, (y - middles[:, None]) / (CELL / 2), 0.0)
+    for gap, contact, under in (
+        ("pad_gap", "pad_contact", mask & (radius <= PAD_RADIUS)),
+        ("gap", "contact", mask),
+    ):
+        if gap in channels:
+            height = draped_gap(z, under)
+            found[gap] = height / Z_FINE_LIMIT
+            found[contact] = (under & (height <= CONTACT_GAP)).float()
+    return torch.stack([found[name] for name in channels], dim=1)
 
 
 def reference_height(z: Float[Tensor, "b h w"], mask: Bool[Tensor, "b h w"]) -> Float[Tensor, " b"]:
@@ -94,7 +118,7 @@ def reference_height(z: Float[Tensor, "b h w"], mask: Bool[Tensor, "b h w"]) -> 
 
 
 def apply_symmetry(
-    inputs: Float[Tensor, "b c h w"], elements: Int[Tensor, " b"]
+    inputs: Float[Tensor, "b c h w"], elements: Int[Tensor, " b"], channels: Channels = CHANNELS
 ) -> Float[Tensor, "b c h w"]:
     """Turn and mirror canonical inputs, each by its own element of the square's symmetries.
 
@@ -103,15 +127,17 @@ def apply_symmetry(
 
     Parameters
     ----------
-    inputs : canonical inputs on a square grid, h = w.
+    inputs : canonical inputs on a square grid, h = w, of ``channels``.
     elements : integers in [0, 8).
     """
     b, c, h, w = inputs.shape
     sources, matrices = _symmetry_tables(h, inputs.device)
     index = sources[elements][:, None, :].expand(b, c, h * w)
     moved = inputs.flatten(2).gather(2, index)
-    xy = torch.einsum("bij,bjk->bik", matrices[elements], moved[:, [X_CHANNEL, Y_CHANNEL]])
-    moved = torch.cat((xy, moved[:, Y_CHANNEL + 1 :]), dim=1)
+    vectors = channels.index("z")  # what stands before are pairs of components
+    pairs = moved[:, :vectors].reshape(b, vectors // 2, 2, h * w)
+    turned = torch.einsum("bij,bpjk->bpik", matrices[elements], pairs).flatten(1, 2)
+    moved = torch.cat((turned, moved[:, vectors:]), dim=1)
     return moved.reshape(b, c, h, w)
 
 

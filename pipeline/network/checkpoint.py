@@ -12,7 +12,7 @@ from torch import Tensor
 
 from pipeline.config.learning import NetworkConfig
 from pipeline.errors import ConfigError, ContentError
-from pipeline.network.canonical import CHANNELS
+from pipeline.network.canonical import CHANNELS, KNOWN_CHANNELS, Channels
 from pipeline.network.ga_cnn import GaCnn, build_network
 
 FORMAT = "softgrip.ga-cnn"
@@ -29,7 +29,7 @@ def save_checkpoint_bytes(network: GaCnn) -> bytes:
     metadata = {
         "format": FORMAT,
         "version": str(FORMAT_VERSION),
-        "channels": json.dumps(CHANNELS),
+        "channels": json.dumps(network.channels),
         "network": network.config.model_dump_json(),
     }
     return tensors_to_bytes(network.state_dict(), metadata)
@@ -53,7 +53,9 @@ def load_checkpoint_bytes(data: bytes) -> GaCnn:
             f"this program reads version {FORMAT_VERSION}",
             _REMEDY,
         )
-    if metadata.get("channels") != json.dumps(CHANNELS):
+    known = {json.dumps(channels): channels for channels in KNOWN_CHANNELS}
+    channels = known.get(metadata.get("channels", ""))
+    if channels is None:
         raise ContentError(
             f"network checkpoint expects the input channels {metadata.get('channels')}, "
             f"this program makes {json.dumps(CHANNELS)}",
@@ -61,8 +63,8 @@ def load_checkpoint_bytes(data: bytes) -> GaCnn:
         )
     try:
         config = NetworkConfig.model_validate_json(metadata.get("network", ""))
-        _check_shapes(config, tensors)
-        network = build_network(config, seed=0)
+        _check_shapes(config, channels, tensors)
+        network = build_network(config, seed=0, channels=channels)
         network.load_state_dict(tensors)
     except (ValidationError, ConfigError, RuntimeError) as error:
         reason = str(error).splitlines()[0]
@@ -74,10 +76,11 @@ def load_checkpoint_bytes(data: bytes) -> GaCnn:
     return network.eval()
 
 
-def _check_shapes(config: NetworkConfig, tensors: Mapping[str, Tensor]) -> None:
+def _check_shapes(config: NetworkConfig, channels: Channels, tensors: Mapping[str, Tensor]) -> None:
     """Hold the weights against the configuration before a network of its size is allocated."""
     with torch.device("meta"):
-        expected = {name: tensor.shape for name, tensor in GaCnn(config).state_dict().items()}
+        network = GaCnn(config, channels)
+        expected = {name: tensor.shape for name, tensor in network.state_dict().items()}
     if {name: tensor.shape for name, tensor in tensors.items()} != expected:
         raise ContentError("network checkpoint does not fit its own configuration", _REMEDY)
 

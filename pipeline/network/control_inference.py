@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float
 
 from pipeline.errors import ArtifactError, ContentError
 from pipeline.network.canonical import network_input
-from pipeline.network.export import INPUT_SHAPE, REMEDY, check_onnx_bytes
+from pipeline.network.export import GRID, REMEDY, check_onnx_bytes
 from pipeline.network.ga_cnn import GaCnn
 from pipeline.network.inference import predict
 from pipeline.network.training import reproducible
@@ -42,9 +42,9 @@ class ControlPredictor:
         ------
         ContentError : the bytes are no such export, or of another version.
         """
-        check_onnx_bytes(data)
+        self._channels = check_onnx_bytes(data)
         try:
-            compiled = _compiled(data, threads)
+            compiled = _compiled(data, (len(self._channels), *GRID), threads)
         # Its messages may quote the bytes of a damaged model, which need not be text.
         except (RuntimeError, UnicodeDecodeError) as error:
             reason = str(error).strip().rpartition("\n")[2]
@@ -61,7 +61,9 @@ class ControlPredictor:
         with reproducible(threads=1), torch.inference_mode():
             for start in range(0, len(cloud), _PREPARED):
                 some = slice(start, start + _PREPARED)
-                inputs = network_input(torch.from_numpy(cloud[some]), torch.from_numpy(mask[some]))
+                inputs = network_input(
+                    torch.from_numpy(cloud[some]), torch.from_numpy(mask[some]), self._channels
+                )
                 self._start(inputs.numpy(), predicted[some])
         self._streams.wait_all()
         return predicted
@@ -105,11 +107,11 @@ def checked_against(
     return difference
 
 
-def _compiled(data: bytes, threads: int) -> openvino.CompiledModel:
+def _compiled(data: bytes, input_shape: tuple[int, ...], threads: int) -> openvino.CompiledModel:
     """A checked export for parts of one size, in as many streams of one thread each."""
     core = openvino.Core()
     model = core.read_model(data)
-    model.reshape([_PART, *INPUT_SHAPE])
+    model.reshape([_PART, *input_shape])
     compiled = core.compile_model(
         model,
         "CPU",

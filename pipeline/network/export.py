@@ -12,12 +12,12 @@ import torch
 from google.protobuf.message import DecodeError
 
 from pipeline.errors import ContentError
-from pipeline.network.canonical import CHANNELS
+from pipeline.network.canonical import KNOWN_CHANNELS, Channels
 from pipeline.network.ga_cnn import GaCnn
 
 FORMAT = "softgrip.ga-cnn.onnx"
 FORMAT_VERSION = 1
-INPUT_SHAPE = (len(CHANNELS), 24, 24)
+GRID = (24, 24)
 REMEDY = "Export the network again."
 
 _INPUT, _OUTPUT = "inputs", "quality"
@@ -34,7 +34,7 @@ _MOST_VALUES = 1 << 21
 
 def export_onnx_bytes(network: GaCnn) -> bytes:
     """The network as ONNX for canonical inputs of any batch; equal networks give equal bytes."""
-    example = torch.zeros(2, *INPUT_SHAPE)
+    example = torch.zeros(2, len(network.channels), *GRID)
     network = network.eval().to(memory_format=torch.contiguous_format)  # type: ignore[call-overload]
     with _quiet_exporter():
         program = torch.onnx.export(
@@ -48,14 +48,18 @@ def export_onnx_bytes(network: GaCnn) -> bytes:
         )
     model = program.model_proto  # type: ignore[union-attr]
     _strip_origins(model)
-    for key, value in _metadata().items():
+    for key, value in _metadata(network.channels).items():
         model.metadata_props.add(key=key, value=value)
     data: bytes = model.SerializeToString(deterministic=True)
     return data
 
 
-def check_onnx_bytes(data: bytes) -> None:
+def check_onnx_bytes(data: bytes) -> Channels:
     """Hold bytes against what ``export_onnx_bytes`` makes, before anything runs them.
+
+    Returns
+    -------
+    The channels of its input.
 
     Raises
     ------
@@ -75,10 +79,14 @@ def check_onnx_bytes(data: bytes) -> None:
         reason = str(error).partition("\n")[0]
         raise ContentError(f"exported network is damaged: {reason}", REMEDY) from error
     properties = {p.key: p.value for p in model.metadata_props}
-    if properties != _metadata():
-        raise ContentError(
-            f"exported network is marked {properties}, this program reads {_metadata()}", REMEDY
-        )
+    for channels in KNOWN_CHANNELS:
+        if properties == _metadata(channels):
+            return channels
+    raise ContentError(
+        f"exported network is marked {properties}, "
+        f"this program reads {_metadata(KNOWN_CHANNELS[0])}",
+        REMEDY,
+    )
 
 
 def _weights(model: onnx.ModelProto) -> Iterator[onnx.TensorProto]:
@@ -123,11 +131,11 @@ def _check_bounded(model: onnx.ModelProto) -> None:
             )
 
 
-def _metadata() -> dict[str, str]:
+def _metadata(channels: Channels) -> dict[str, str]:
     return {
         "format": FORMAT,
         "version": str(FORMAT_VERSION),
-        "channels": json.dumps(CHANNELS),
+        "channels": json.dumps(channels),
     }
 
 

@@ -54,6 +54,19 @@ def mean_absolute_error(
     return float(np.abs(predicted.astype(np.float64) - quality.astype(np.float64)).mean())
 
 
+def weighted_error(
+    predicted: Float[np.ndarray, " n"],
+    quality: Float[np.ndarray, " n"],
+    weight: Float[np.ndarray, " n"],
+) -> float | None:
+    """Mean |q̂ − q| weighted by ``weight``; None where weights are unknown (NaN) or all zero."""
+    total = float(weight.sum(dtype=np.float64))
+    if not total > 0:
+        return None
+    error = np.abs(predicted.astype(np.float64) - quality.astype(np.float64))
+    return float(error @ weight.astype(np.float64)) / total
+
+
 def error_by_quality_bin(
     predicted: Float[np.ndarray, " n"], quality: Float[np.ndarray, " n"]
 ) -> tuple[BinnedError, ...]:

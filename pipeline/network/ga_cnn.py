@@ -38,7 +38,7 @@ from torch import Tensor, nn
 
 from pipeline.config.learning import NetworkConfig
 from pipeline.errors import ConfigError
-from pipeline.network.canonical import INPUT_CHANNELS
+from pipeline.network.canonical import CHANNELS, Channels
 
 SHALLOWEST = 18
 DEEPEST = 102
@@ -152,16 +152,18 @@ class GaCnn(nn.Module):
     Attributes
     ----------
     config : what the network was built from.
+    channels : of its input, see ``canonical.network_input``.
     """
 
-    def __init__(self, config: NetworkConfig) -> None:
+    def __init__(self, config: NetworkConfig, channels: Channels = CHANNELS) -> None:
         """Raise ConfigError where ``config`` names no member of the family."""
         super().__init__()
         self.config = config
+        self.channels = channels
         _check_channels(config.channels)
         first, last = config.channels[0], config.channels[-1]
         self.stem = nn.Sequential(
-            nn.Conv2d(INPUT_CHANNELS, first // 2, 3, padding=1, bias=False),
+            nn.Conv2d(len(channels), first // 2, 3, padding=1, bias=False),
             nn.BatchNorm2d(first // 2),
             nn.ReLU(),
             nn.Conv2d(first // 2, first, 3, stride=2, padding=1, bias=False),
@@ -193,7 +195,7 @@ class GaCnn(nn.Module):
         return torch.sigmoid(logits.float()).squeeze(1)
 
 
-def build_network(config: NetworkConfig, seed: int) -> GaCnn:
+def build_network(config: NetworkConfig, seed: int, channels: Channels = CHANNELS) -> GaCnn:
     """A network with initial weights drawn from ``seed``; global generators stay as they are.
 
     Raises
@@ -202,7 +204,7 @@ def build_network(config: NetworkConfig, seed: int) -> GaCnn:
     """
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
-        return GaCnn(config)
+        return GaCnn(config, channels)
 
 
 def parameter_count(network: nn.Module) -> int:

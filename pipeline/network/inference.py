@@ -32,11 +32,13 @@ def predict(
     with reproducible(threads), torch.inference_mode():
         for start in range(0, len(cloud), batch_size):
             part = slice(start, start + batch_size)
-            inputs = network_input(torch.from_numpy(cloud[part]), torch.from_numpy(mask[part]))
+            inputs = network_input(
+                torch.from_numpy(cloud[part]), torch.from_numpy(mask[part]), model.channels
+            )
             outputs = []
             for element in elements:
                 chosen = torch.full((len(inputs),), element)
-                turned = inputs if element == 0 else apply_symmetry(inputs, chosen)
+                turned = apply_symmetry(inputs, chosen, model.channels) if element else inputs
                 outputs.append(model(turned.contiguous(memory_format=torch.channels_last)))
             predicted[part] = torch.stack(outputs).mean(dim=0).numpy()
     return predicted

@@ -84,6 +84,15 @@ def result_table(figures: TestFigures) -> str:
         ("seal ratio alone", f"{figures.seal_ratio_mae:.4f}", len(figures.quality)),
         ("mean predictor", f"{figures.mean_predictor_mae:.4f}", len(figures.quality)),
     ]
+    as_proposed = [
+        ("GA-CNN over grasps as first proposed", figures.mae_as_proposed),
+        ("mean predictor over the same", figures.mean_predictor_mae_as_proposed),
+    ]
+    rows += [
+        (name, f"{error:.4f}", len(figures.quality))
+        for name, error in as_proposed
+        if error is not None
+    ]
     rows += [
         (f"GA-CNN on {name} objects", f"{error:.4f}", figures.count_by_class[name])
         for name, error in figures.by_class.items()

@@ -13,7 +13,7 @@ from pipeline.config.cameras import (
     StaticCameraConfig,
     WristCameraConfig,
 )
-from pipeline.geometry.transforms import look_at, rotate_vectors, transform_points
+from pipeline.geometry.transforms import invert, look_at, rotate_vectors, transform_points
 
 _TARGET_M = np.array([0.0, 0.0, 0.02])  # the middle of the table, a little above it
 
@@ -141,6 +141,24 @@ def points_of_depth(
         _on_unit_plane(camera, rows, columns) * depth_m[rows, columns].astype(np.float64)[:, None]
     )
     return transform_points(camera.world_from_camera, points), rows, columns
+
+
+def shown_whole(
+    camera: PinholeCamera, points_m: Float[np.ndarray, "n 3"], radius_m: float
+) -> Bool[np.ndarray, " n"]:
+    """Whether the picture does not end within ``radius_m`` of each point in WCS.
+
+    What a picture can show is a pyramid: a ball lies in it where its centre is at least its
+    radius inside each of the four faces.
+    """
+    k = camera.intrinsics
+    left, top = k[0, 2] / k[0, 0], k[1, 2] / k[1, 1]
+    right = (camera.width_px - k[0, 2]) / k[0, 0]
+    bottom = (camera.height_px - k[1, 2]) / k[1, 1]
+    inward = np.array([[1.0, 0, left], [-1.0, 0, right], [0, 1.0, top], [0, -1.0, bottom]])
+    inward /= np.linalg.norm(inward, axis=1, keepdims=True)
+    in_camera = transform_points(invert(camera.world_from_camera), points_m)
+    return np.asarray((in_camera @ inward.T >= radius_m).all(axis=1))
 
 
 def _on_unit_plane(

@@ -1,9 +1,13 @@
 """Transform and Desample (S-1.14, S-1.15): a depth image → an organised grid around a contact.
 
 The grid is a square in the contact's xy-plane; y grows with the row, x with the column. A
-cell holds the mean of the measured points over it, and nothing where none was measured.
-Points farther than ``grid_depth_m`` from the contact along z are left out: the pad cannot
-reach them (H = 30 mm) and they would only blur the cell's mean.
+cell holds what the pad would meet in it first: the mean of the measured points over it that
+are within ``layer_m`` of the highest, and nothing where none was measured. At an edge the
+mean's x and y so tell how much of the cell the upper surface covers, which a mean of both
+surfaces would not.
+
+Points more than ``grid_depth_m`` below the contact are left out: the pad cannot reach them
+(H = 30 mm). Upwards the grid is as high as the way on which the label looks for obstacles.
 """
 
 from collections.abc import Sequence
@@ -36,16 +40,21 @@ def merged_sub_clouds(
 ) -> tuple[Float[np.ndarray, "b g g 3"], Bool[np.ndarray, "b g g"]]:
     """The same from the points of several depth images together (Supplement VI)."""
     count, cells = len(world_from_contact), config.grid_cells
-    sums = np.zeros((count, cells, cells, 4))
-    for depth_m, camera in pictures:
-        _add(
+    box = (config.grid_side_m / 2, config.grid_depth_m, config.grid_height_m)
+    seen_by = [
+        (
             np.ascontiguousarray(depth_m, dtype=np.float64),
             camera.intrinsics,
             np.ascontiguousarray(invert(camera.world_from_camera) @ world_from_contact),
-            config.grid_side_m,
-            config.grid_depth_m,
-            sums,
         )
+        for depth_m, camera in pictures
+    ]
+    tops = np.full((count, cells, cells), -np.inf)
+    sums = np.zeros((count, cells, cells, 4))
+    for picture in seen_by:
+        _raise_tops(*picture, box, tops)
+    for picture in seen_by:
+        _add(*picture, box, config.layer_m, tops, sums)
     cloud = np.zeros((count, cells, cells, 3), dtype=np.float32)
     seen = np.zeros((count, cells, cells), dtype=np.bool_)
     _means(sums, radius_m, cloud, seen)
@@ -53,59 +62,145 @@ def merged_sub_clouds(
 
 
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]
+def _raise_tops(
+    depth: Float[np.ndarray, "h w"],
+    k: Float[np.ndarray, "3 3"],
+    camera_from_contact: Float[np.ndarray, "b 4 4"],
+    box: tuple[float, float, float],
+    tops: Float[np.ndarray, "b g g"],
+) -> None:
+    """Raise each cell's highest point by those of one depth image."""
+    cells = tops.shape[1]
+    for b in range(len(camera_from_contact)):
+        pose = camera_from_contact[b]
+        left, right, top, bottom = _window(depth.shape, k, pose, box)
+        across, origin = _axes(k, pose)
+        for row in range(top, bottom + 1):
+            down = _of_row(row, k, pose)
+            for column in range(left, right + 1):
+                z = depth[row, column]
+                if z > 0.0:
+                    point = _placed(z, column, across, down, origin)
+                    i, j = _cell(point, box, cells)
+                    if i >= 0:
+                        tops[b, i, j] = max(tops[b, i, j], point[2])
+
+
+@numba.njit(cache=True)  # type: ignore[untyped-decorator]
 def _add(
     depth: Float[np.ndarray, "h w"],
     k: Float[np.ndarray, "3 3"],
     camera_from_contact: Float[np.ndarray, "b 4 4"],
-    side: float,
-    reach: float,
+    box: tuple[float, float, float],
+    layer: float,
+    tops: Float[np.ndarray, "b g g"],
     sums: Float[np.ndarray, "b g g 4"],
 ) -> None:
-    """Add the points of one depth image, and their number, to their cells' sums."""
-    height, width = depth.shape
-    cells = sums.shape[1]
-    half = side / 2
+    """Add the points of one depth image, and their number, to the sums of the cells they top."""
+    cells = tops.shape[1]
     for b in range(len(camera_from_contact)):
         pose = camera_from_contact[b]
-        # The window that the box's eight corners project into.
-        left, right, top, bottom = width, -1, height, -1
-        behind = False
-        for corner in range(8):
-            px = half if corner & 1 else -half
-            py = half if corner & 2 else -half
-            pz = reach if corner & 4 else -reach
-            x = pose[0, 0] * px + pose[0, 1] * py + pose[0, 2] * pz + pose[0, 3]
-            y = pose[1, 0] * px + pose[1, 1] * py + pose[1, 2] * pz + pose[1, 3]
-            z = pose[2, 0] * px + pose[2, 1] * py + pose[2, 2] * pz + pose[2, 3]
-            if z <= 0.0:
-                behind = True
-                break
-            column = int(np.floor(k[0, 0] * x / z + k[0, 2]))
-            row = int(np.floor(k[1, 1] * y / z + k[1, 2]))
-            left, right = min(left, column), max(right, column)
-            top, bottom = min(top, row), max(bottom, row)
-        if behind:
-            left, right, top, bottom = 0, width - 1, 0, height - 1
-        for row in range(max(top, 0), min(bottom, height - 1) + 1):
-            for column in range(max(left, 0), min(right, width - 1) + 1):
+        left, right, top, bottom = _window(depth.shape, k, pose, box)
+        across, origin = _axes(k, pose)
+        for row in range(top, bottom + 1):
+            down = _of_row(row, k, pose)
+            for column in range(left, right + 1):
                 z = depth[row, column]
-                if not z > 0.0:
-                    continue
-                dx = z * (column + 0.5 - k[0, 2]) / k[0, 0] - pose[0, 3]
-                dy = z * (row + 0.5 - k[1, 2]) / k[1, 1] - pose[1, 3]
-                dz = z - pose[2, 3]
-                gx = pose[0, 0] * dx + pose[1, 0] * dy + pose[2, 0] * dz
-                gy = pose[0, 1] * dx + pose[1, 1] * dy + pose[2, 1] * dz
-                gz = pose[0, 2] * dx + pose[1, 2] * dy + pose[2, 2] * dz
-                if abs(gz) > reach:
-                    continue
-                i = int(np.floor((gy + half) / side * cells))
-                j = int(np.floor((gx + half) / side * cells))
-                if 0 <= i < cells and 0 <= j < cells:
-                    sums[b, i, j, 0] += gx
-                    sums[b, i, j, 1] += gy
-                    sums[b, i, j, 2] += gz
-                    sums[b, i, j, 3] += 1.0
+                if z > 0.0:
+                    point = _placed(z, column, across, down, origin)
+                    i, j = _cell(point, box, cells)
+                    if i >= 0 and point[2] >= tops[b, i, j] - layer:
+                        for axis in range(3):
+                            sums[b, i, j, axis] += point[axis]
+                        sums[b, i, j, 3] += 1.0
+
+
+@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+def _window(
+    shape: tuple[int, int],
+    k: Float[np.ndarray, "3 3"],
+    pose: Float[np.ndarray, "4 4"],
+    box: tuple[float, float, float],
+) -> tuple[int, int, int, int]:
+    """First and last column, first and last row that the box's eight corners project between."""
+    half, depth, height = box
+    left, right, top, bottom = shape[1], -1, shape[0], -1
+    for corner in range(8):
+        px = half if corner & 1 else -half
+        py = half if corner & 2 else -half
+        pz = height if corner & 4 else -depth
+        x = pose[0, 0] * px + pose[0, 1] * py + pose[0, 2] * pz + pose[0, 3]
+        y = pose[1, 0] * px + pose[1, 1] * py + pose[1, 2] * pz + pose[1, 3]
+        z = pose[2, 0] * px + pose[2, 1] * py + pose[2, 2] * pz + pose[2, 3]
+        if z <= 0.0:  # behind the camera: anywhere in the picture
+            return 0, shape[1] - 1, 0, shape[0] - 1
+        column = int(np.floor(k[0, 0] * x / z + k[0, 2]))
+        row = int(np.floor(k[1, 1] * y / z + k[1, 2]))
+        left, right = min(left, column), max(right, column)
+        top, bottom = min(top, row), max(bottom, row)
+    return max(left, 0), min(right, shape[1] - 1), max(top, 0), min(bottom, shape[0] - 1)
+
+
+# A pixel's point in CCS is z (u, v, 1), with u of its column and v of its row. In the contact's
+# axes, R^T (z (u, v, 1) - t), only the term in u changes along a row.
+
+
+@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+def _axes(
+    k: Float[np.ndarray, "3 3"], pose: Float[np.ndarray, "4 4"]
+) -> tuple[tuple[float, float, float, float, float], tuple[float, float, float]]:
+    """R^T along u for a column, with the columns' scale; and R^T t."""
+    across = (pose[0, 0], pose[0, 1], pose[0, 2], 1.0 / k[0, 0], k[0, 2] - 0.5)
+    x, y, z = pose[0, 3], pose[1, 3], pose[2, 3]
+    return across, (
+        pose[0, 0] * x + pose[1, 0] * y + pose[2, 0] * z,
+        pose[0, 1] * x + pose[1, 1] * y + pose[2, 1] * z,
+        pose[0, 2] * x + pose[1, 2] * y + pose[2, 2] * z,
+    )
+
+
+@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+def _of_row(
+    row: int, k: Float[np.ndarray, "3 3"], pose: Float[np.ndarray, "4 4"]
+) -> tuple[float, float, float]:
+    """R^T (0, v, 1) of a row."""
+    v = (row + 0.5 - k[1, 2]) / k[1, 1]
+    return (
+        pose[1, 0] * v + pose[2, 0],
+        pose[1, 1] * v + pose[2, 1],
+        pose[1, 2] * v + pose[2, 2],
+    )
+
+
+@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+def _placed(
+    z: float,
+    column: int,
+    across: tuple[float, float, float, float, float],
+    down: tuple[float, float, float],
+    origin: tuple[float, float, float],
+) -> tuple[float, float, float]:
+    """A pixel's point from the contact, in the contact's axes."""
+    u = (column - across[4]) * across[3]
+    return (
+        z * (across[0] * u + down[0]) - origin[0],
+        z * (across[1] * u + down[1]) - origin[1],
+        z * (across[2] * u + down[2]) - origin[2],
+    )
+
+
+@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+def _cell(
+    point: tuple[float, float, float], box: tuple[float, float, float], cells: int
+) -> tuple[int, int]:
+    """The cell a point lies in; -1 outside the box."""
+    half, depth, height = box
+    x, y, z = point
+    if z < -depth or z > height or abs(x) >= half or abs(y) >= half:
+        return -1, -1
+    scale = cells / (2.0 * half)
+    # Rounding may carry a point just inside the border over it.
+    return min(int((y + half) * scale), cells - 1), min(int((x + half) * scale), cells - 1)
 
 
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]

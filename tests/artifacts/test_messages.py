@@ -50,6 +50,7 @@ def some_grasps(count: int, vertices: int = 586) -> LabelledGrasps:
         cloud=rng.normal(size=(count, 24, 24, 3)).astype(np.float16),
         cloud_mask=rng.random((count, 24, 24)) < 0.5,
         touch_height_m=rng.random(count),
+        pictures=rng.integers(1, 4, count),
     )
 
 
@@ -89,6 +90,8 @@ def test_samples_round_trip_and_join() -> None:
         shape_class=rng.integers(0, 3, 9),
         level=rng.integers(1, 10, 9),
         pressure=rng.random(9).astype(np.float32),
+        proposal_weight=rng.random(9).astype(np.float32),
+        pictures=rng.integers(1, 4, 9),
     )
     parts = [samples.take(slice(0, 4)), samples.take(slice(4, 9))]
     wired = [

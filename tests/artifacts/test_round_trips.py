@@ -175,6 +175,8 @@ def test_samples_round_trip_in_any_number(seed: int, count: int, side: int) -> N
         shape_class=rng.integers(0, 3, count),
         level=rng.integers(1, 10, count),
         pressure=rng.random(count).astype(np.float32),
+        proposal_weight=rng.random(count).astype(np.float32),
+        pictures=rng.integers(1, 4, count),
     )
     wire = sample_batch(samples, ("a", "b")).SerializeToString()
     same(samples_of(samples_pb2.SampleBatch.FromString(wire)), samples)

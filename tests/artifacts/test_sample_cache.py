@@ -23,6 +23,8 @@ def some_samples(count: int, seed: int) -> Samples:
         shape_class=rng.integers(0, 3, count),
         level=rng.integers(1, 10, count),
         pressure=rng.random(count).astype(np.float32),
+        proposal_weight=rng.random(count).astype(np.float32),
+        pictures=rng.integers(1, 4, count),
     )
 
 

@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from pipeline.artifacts.tensors import DTYPES, from_tensor, to_tensor
+from pipeline.artifacts.tensors import DTYPES, from_tensor, tensors_of, to_tensor
 from pipeline.errors import ArtifactError
+from schemas.softgrip.v1.samples_pb2 import SampleBatch
 from schemas.softgrip.v1.tensor_pb2 import Tensor
 
 
@@ -50,3 +51,17 @@ def test_lies_are_refused_before_anything_is_allocated(tensor: Tensor, said: str
 def test_objects_cannot_be_stored() -> None:
     with pytest.raises(ArtifactError, match="dtype object"):
         to_tensor(np.array([{}], dtype=object))
+
+
+def test_a_field_that_older_files_lack_is_filled_and_another_missing_one_is_refused() -> None:
+    message = SampleBatch()
+    message.quality.CopyFrom(to_tensor(np.zeros(3, dtype=np.float32)))
+    stored_as, shapes = {"quality": "f4", "pictures": "u1"}, {"quality": "n", "pictures": "n"}
+    arrays = tensors_of(message, stored_as, shapes, {"pictures": 1})
+    np.testing.assert_array_equal(arrays["pictures"], np.ones(3, dtype=np.uint8))
+    assert arrays["pictures"].dtype == np.uint8
+    with pytest.raises(ArtifactError, match="unknown dtype"):
+        tensors_of(message, stored_as, shapes)
+    message.pictures.CopyFrom(to_tensor(np.full(2, 3, dtype=np.uint8)))
+    with pytest.raises(ArtifactError, match="'pictures'"):
+        tensors_of(message, stored_as, shapes, {"pictures": 1})

@@ -187,6 +187,8 @@ def _samples(rng: np.random.Generator) -> Samples:
         shape_class=np.zeros(2, dtype=np.int64),
         level=np.ones(2, dtype=np.int64),
         pressure=rng.random(2),
+        proposal_weight=rng.random(2),
+        pictures=np.ones(2, dtype=np.int64),
     )
 
 
@@ -211,6 +213,7 @@ def _grasps(rng: np.random.Generator) -> GraspBatch:
         cloud=rng.random((2, 3, 3, 3)),
         cloud_mask=np.ones((2, 3, 3), dtype=bool),
         touch_height_m=real,
+        pictures=np.ones(2, dtype=np.int64),
     )
     return grasp_batch(origin, grasps)
 

@@ -1,11 +1,19 @@
 """Balancing: never more than asked, flatter, honest about its probabilities."""
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from pipeline.gripper.balancing import flattened, quality_histogram, rare_grasps, tenth_of
+from pipeline.gripper.balancing import (
+    first_proposals,
+    flattened,
+    quality_histogram,
+    rare_grasps,
+    tenth_of,
+)
+from pipeline.gripper.sampling import Proposal
 
 LABELS = hnp.arrays(np.float64, st.integers(1, 200), elements=st.floats(0, 1))
 
@@ -53,3 +61,18 @@ def test_rare_labels_are_drawn_as_often_as_common_ones() -> None:
     drawn = rare_grasps(quality, 4000, np.random.default_rng(0))
     # Binomial(4000, 1/2): five standard deviations are 0.04.
     assert abs((quality[drawn] > 0.5).mean() - 0.5) < 0.04
+
+
+def test_weights_undo_what_balancing_did() -> None:
+    rng = np.random.default_rng(0)
+    quality = np.concatenate([rng.beta(0.2, 1.0, 6000), rng.random(9000)])
+    proposal = np.repeat([Proposal.NORMAL, Proposal.TILTED, Proposal.NEARBY], [3000, 3000, 9000])
+    kept, probability = flattened(quality, 5000, 0.7, rng)
+    weight = first_proposals(proposal[kept], probability)
+    assert (weight[proposal[kept] == Proposal.NEARBY] == 0).all()
+    assert abs(quality[kept].mean() - quality[:6000].mean()) > 0.1
+    # Some 1500 kept of a spread of 0.25: four standard errors are 0.03.
+    assert np.average(quality[kept], weights=weight) == pytest.approx(
+        quality[:6000].mean(), abs=0.03
+    )
+    assert weight.sum() == pytest.approx(6000, rel=0.05)

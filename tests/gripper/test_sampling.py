@@ -1,5 +1,7 @@
 """Proposals lie on the surface, within their bounds, and are reproducible."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -16,12 +18,17 @@ from pipeline.gripper.sampling import (
 )
 
 
+def seen_from_above(points: np.ndarray, normals: np.ndarray, body: np.ndarray) -> VisibleSurface:
+    """Whole in a picture taken from 0.5 m above the origin."""
+    return VisibleSurface(points, normals, body, np.array([0, 0, 0.5]), np.full(len(body), True))
+
+
 @pytest.fixture
 def sphere() -> VisibleSurface:
     """20 000 points of a sphere of 50 mm radius, body 3."""
     normals = np.random.default_rng(1).normal(size=(20_000, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return VisibleSurface(0.05 * normals, normals, np.full(20_000, 3))
+    return seen_from_above(0.05 * normals, normals, np.full(20_000, 3))
 
 
 def test_contacts_lie_on_the_surface_and_frames_are_rigid(sphere: VisibleSurface) -> None:
@@ -39,7 +46,9 @@ def test_contacts_lie_on_the_surface_and_frames_are_rigid(sphere: VisibleSurface
 def test_untilted_proposals_follow_the_normal_and_tilted_ones_their_angle(
     sphere: VisibleSurface,
 ) -> None:
-    config = GraspsConfig(tilt_max_rad=0.5, normal_share=0.5)
+    config = GraspsConfig(tilt_max_rad=0.5, normal_share=0.5, seen_angle_max_rad=np.pi / 2)
+    top = sphere.normals[:, 2] > 0.95  # where no tilt turns away from the camera
+    sphere = replace(sphere, inside=top)
     grasps = propose(sphere, 2000, config, np.random.default_rng(0))
     outward = grasps.world_from_contact[:, :3, 3] / 0.05
     angle = np.arccos(np.clip((outward * grasps.world_from_contact[:, :3, 2]).sum(1), -1, 1))
@@ -49,6 +58,33 @@ def test_untilted_proposals_follow_the_normal_and_tilted_ones_their_angle(
     assert 0.45 < normal.mean() < 0.55
     assert (grasps.tilt_rad[normal] == 0).all()
     assert grasps.tilt_rad.max() <= 0.5
+
+
+@pytest.mark.parametrize("angle_max_rad", [0.3, 0.8])
+def test_the_camera_sees_every_approach_face_on(
+    sphere: VisibleSurface, angle_max_rad: float
+) -> None:
+    """A mean normal over a small cap is a hair off the contact's own."""
+    config = GraspsConfig(seen_angle_max_rad=angle_max_rad)
+    first = propose(sphere, 2000, config, np.random.default_rng(0))
+    near = propose_nearby(sphere, first, config, np.random.default_rng(1))
+    for grasps in (first, near):
+        contact, approach = (grasps.world_from_contact[:, :3, axis] for axis in (3, 2))
+        to_eye = sphere.eye_m - contact
+        cosine = (approach * to_eye).sum(axis=1) / np.linalg.norm(to_eye, axis=1)
+        assert np.arccos(cosine).max() <= angle_max_rad + 0.03
+    # The bound is reached, not merely kept, and part of the approaches is tilted still.
+    assert np.arccos(cosine).max() > 0.9 * angle_max_rad
+    assert (first.tilt_rad > 0).mean() > 0.1
+
+
+def test_no_contact_lies_where_the_picture_ends(sphere: VisibleSurface) -> None:
+    """The picture shows the half x > 0 alone."""
+    half = replace(sphere, inside=sphere.points_m[:, 0] > 0)
+    first = propose(half, 300, GraspsConfig(), np.random.default_rng(0))
+    near = propose_nearby(half, first, GraspsConfig(), np.random.default_rng(1))
+    for grasps in (first, near):
+        assert (grasps.world_from_contact[:, 0, 3] > 0).all()
 
 
 def test_nearby_proposals_stay_near(sphere: VisibleSurface) -> None:
@@ -72,7 +108,7 @@ def test_mean_normal_of_a_right_angled_edge_is_the_diagonal() -> None:
     zero = np.zeros_like(u)
     points = np.concatenate([np.stack([-u, v, zero], 1), np.stack([zero, v, -u], 1)])
     normals = np.concatenate([np.tile([0.0, 0, 1], (len(u), 1)), np.tile([1.0, 0, 0], (len(u), 1))])
-    surface = VisibleSurface(points, normals, np.ones(len(points), dtype=int))
+    surface = seen_from_above(points, normals, np.ones(len(points), dtype=int))
     mean = mean_normals(surface, np.zeros((1, 3)), 0.01)
     np.testing.assert_allclose(mean, [[np.sqrt(0.5), 0, np.sqrt(0.5)]], atol=1e-12)
 

@@ -8,8 +8,9 @@ from hypothesis import strategies as st
 
 from pipeline.network.canonical import (
     CHANNELS,
+    CHANNELS_0_1,
+    KNOWN_CHANNELS,
     SYMMETRIES,
-    X_CHANNEL,
     apply_symmetry,
     inverse_symmetry,
     network_input,
@@ -95,7 +96,7 @@ def test_channels_are_bounded_and_zero_where_unseen(seed: int) -> None:
     assert bool((inputs[:, ~mask[0]] == 0).all())
     assert float(inputs[CHANNELS.index("z")].abs().max()) <= 1.2 + 1e-6
     assert float(inputs[CHANNELS.index("z_fine")].abs().max()) <= 1
-    assert torch.equal(inputs[X_CHANNEL][mask[0]], cloud[0, ..., 0][mask[0]])
+    assert torch.equal(inputs[CHANNELS.index("x")][mask[0]], cloud[0, ..., 0][mask[0]])
 
 
 def test_reference_is_the_median_of_the_middle_and_outliers_do_not_move_it() -> None:
@@ -111,3 +112,35 @@ def test_reference_without_a_seen_middle_falls_back_to_all_then_to_zero() -> Non
     mask = torch.zeros(2, CELLS, CELLS, dtype=torch.bool)
     mask[0, 0, 0] = True
     assert reference_height(z, mask).tolist() == [0.5, 0.0]
+
+
+def test_in_its_cell_a_point_is_told_to_a_border_of_one() -> None:
+    step = 2 * HALF_SIDE / CELLS
+    x, y = grid_xy()
+    points = np.stack((x + 0.25 * step, y - 0.5 * step + 1e-4, 0 * x), axis=-1).reshape(-1, 3)
+    inputs = network_input(*organised(points.astype(np.float32)))[0]
+    in_cell = inputs[[CHANNELS.index("x_in_cell"), CHANNELS.index("y_in_cell")]]
+    torch.testing.assert_close(in_cell[0], torch.full_like(in_cell[0], 0.5), atol=1e-4, rtol=0)
+    torch.testing.assert_close(in_cell[1], torch.full_like(in_cell[1], -0.998), atol=1e-4, rtol=0)
+
+
+def test_what_lies_beyond_the_pad_holds_it_up_no_more() -> None:
+    x, y = grid_xy()
+    for distance, held in ((0.9, True), (1.15, False)):
+        z = np.where(np.hypot(x - distance, y) < 0.08, 1.25, 0.0)
+        points = np.stack((x, y, z), axis=-1).reshape(-1, 3).astype(np.float32)
+        inputs = network_input(*organised(points))[0]
+        contact = inputs[CHANNELS.index("pad_contact")].bool()
+        assert bool(contact[np.hypot(x, y) > 1.0].any()) is False
+        assert bool(contact[np.hypot(x, y) < 0.5].all()) is not held
+        old = network_input(*organised(points), channels=CHANNELS_0_1)[0]
+        assert not bool(old[CHANNELS_0_1.index("contact")][np.hypot(x, y) < 0.1].any())
+
+
+@pytest.mark.parametrize("channels", KNOWN_CHANNELS)
+def test_every_known_set_of_channels_turns_with_the_cloud(channels: tuple[str, ...]) -> None:
+    points = scattered_points(seed=5)
+    augmented = apply_symmetry(
+        network_input(*organised(points), channels), torch.tensor([6]), channels
+    )
+    assert torch.equal(augmented, network_input(*organised(moved(points, 6)), channels))

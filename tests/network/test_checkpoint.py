@@ -7,7 +7,7 @@ from safetensors.torch import save
 from pipeline.config.learning import NetworkConfig
 from pipeline.errors import ArtifactError
 from pipeline.network import checkpoint
-from pipeline.network.canonical import INPUT_CHANNELS
+from pipeline.network.canonical import CHANNELS
 from pipeline.network.checkpoint import load_checkpoint_bytes, save_checkpoint_bytes
 from pipeline.network.ga_cnn import GaCnn, build_network
 
@@ -26,7 +26,7 @@ def data(network: GaCnn) -> bytes:
 
 def test_loaded_network_predicts_the_same_bits(network: GaCnn, data: bytes) -> None:
     loaded = load_checkpoint_bytes(data)
-    inputs = torch.randn(4, INPUT_CHANNELS, 24, 24, generator=torch.Generator())
+    inputs = torch.randn(4, len(CHANNELS), 24, 24, generator=torch.Generator())
     with torch.inference_mode():
         assert torch.equal(loaded(inputs), network(inputs))
     assert loaded.config == CONFIG

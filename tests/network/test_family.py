@@ -5,7 +5,7 @@ import pytest
 
 from pipeline.config.learning import NetworkConfig, SweepConfig
 from pipeline.errors import ConfigError
-from pipeline.network.canonical import INPUT_CHANNELS
+from pipeline.network.canonical import CHANNELS
 from pipeline.network.family import (
     VARIANTS,
     chosen_member,
@@ -48,7 +48,7 @@ def test_a_depth_that_no_member_has_is_refused_before_any_training() -> None:
 def test_multiply_adds_are_those_of_the_layers_sizes() -> None:
     c = 16
     network = build_network(NetworkConfig(layers=18, channels=(c, c, c, c), attention="none"), 0)
-    stem = 24 * 24 * INPUT_CHANNELS * (c // 2) * 9 + 12 * 12 * (c // 2) * c * 9
+    stem = 24 * 24 * len(CHANNELS) * (c // 2) * 9 + 12 * 12 * (c // 2) * c * 9
     # Blocks of 9 c and c weights a channel and cell; strides halve the map in the second and third
     # stage, whose shortcuts then project. 18 layers are 1, 2, 2, 2 blocks.
     block = (9 * c * c) + c * c

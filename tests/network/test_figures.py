@@ -13,6 +13,7 @@ from pipeline.network.figures import (
     error_by_class,
     error_by_quality_bin,
     mean_absolute_error,
+    weighted_error,
 )
 
 PREDICTED = np.array([0.1, 0.4, 0.95, 1.0], dtype=np.float32)
@@ -62,3 +63,13 @@ def test_perfect_predictions_are_calibrated(quality: np.ndarray) -> None:
         assert row.mean_predicted == row.mean_quality
         if row.mean_predicted is not None:
             assert row.low - 1e-12 <= row.mean_predicted <= row.high + 1e-12
+
+
+def test_weighted_error_by_hand_and_none_without_weights() -> None:
+    weight = np.array([3.0, 0.0, 1.0, 0.0])
+    errors = np.abs(PREDICTED - QUALITY)
+    expected = (3 * errors[0] + errors[2]) / 4
+    assert weighted_error(PREDICTED, QUALITY, weight) == pytest.approx(expected)
+    assert weighted_error(PREDICTED, QUALITY, np.ones(4)) == pytest.approx(errors.mean())
+    assert weighted_error(PREDICTED, QUALITY, np.full(4, np.nan)) is None
+    assert weighted_error(PREDICTED, QUALITY, np.zeros(4)) is None

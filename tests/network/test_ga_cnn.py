@@ -5,7 +5,7 @@ import torch
 
 from pipeline.config.learning import NetworkConfig
 from pipeline.errors import ConfigError
-from pipeline.network.canonical import INPUT_CHANNELS
+from pipeline.network.canonical import CHANNELS
 from pipeline.network.ga_cnn import (
     DEEPEST,
     SHALLOWEST,
@@ -74,7 +74,7 @@ def test_ablation_differs_by_the_attention_alone() -> None:
 
 def test_quality_lies_between_0_and_1_for_any_finite_input() -> None:
     network = build_network(SMALL, seed=0).eval()
-    inputs = 100 * torch.randn(16, INPUT_CHANNELS, 24, 24, generator=torch.Generator())
+    inputs = 100 * torch.randn(16, len(CHANNELS), 24, 24, generator=torch.Generator())
     with torch.inference_mode():
         quality = network(inputs)
     assert quality.shape == (16,)

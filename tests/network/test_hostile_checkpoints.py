@@ -88,7 +88,7 @@ def model(
     outputs = [helper.make_tensor_value_info("q", TensorProto.FLOAT, gives)]
     graph = helper.make_graph(nodes, "g", inputs, outputs, weights)
     made = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=10)
-    for key, value in _metadata().items():
+    for key, value in _metadata(CHANNELS).items():
         made.metadata_props.add(key=key, value=value)
     data: bytes = made.SerializeToString()
     return data

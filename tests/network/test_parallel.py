@@ -9,7 +9,7 @@ import pytest
 import torch
 
 from pipeline.config.learning import NetworkConfig
-from pipeline.network.canonical import INPUT_CHANNELS
+from pipeline.network.canonical import CHANNELS
 from pipeline.network.ga_cnn import build_network
 from pipeline.network.parallel import ALONE, SyncedBatchNorm, joined_ranks, with_synced_norms
 from tests.network.train_in_ranks import SAMPLES, trained_in
@@ -62,6 +62,6 @@ def test_synced_norms_keep_names_and_weights_and_predict_alike() -> None:
     norms = [m for m in synced.modules() if isinstance(m, torch.nn.BatchNorm2d)]
     assert norms
     assert all(isinstance(norm, SyncedBatchNorm) for norm in norms)
-    inputs = torch.randn(4, INPUT_CHANNELS, 24, 24, generator=torch.Generator().manual_seed(0))
+    inputs = torch.randn(4, len(CHANNELS), 24, 24, generator=torch.Generator().manual_seed(0))
     with torch.inference_mode():
         assert torch.equal(synced.eval()(inputs), plain.eval()(inputs))

@@ -25,10 +25,12 @@ from pipeline.geometry.catalogue import CatalogueObject, MeasuredObject, finish_
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.mesh_files import MeshSource
 from pipeline.geometry.shape import nsvr, shape_class
+from pipeline.geometry.transforms import invert, transform_points
 from pipeline.sensing.cameras import (
     camera_names,
     points_of_depth,
     scene_cameras,
+    shown_whole,
     static_cameras,
     wrist_cameras,
 )
@@ -307,10 +309,15 @@ def test_grid_matches_a_plain_loop(view: CameraView) -> None:
     cells, half = config.grid_cells, config.grid_side_m / 2
     for index, pose in enumerate(poses):
         local = points - pose[:3, 3]
-        local = local[np.abs(local[:, 2]) <= config.grid_depth_m]
+        height = local[:, 2]
+        local = local[(height >= -config.grid_depth_m) & (height <= config.grid_height_m)]
         row = np.floor((local[:, 1] + half) / (2 * half) * cells).astype(int)
         column = np.floor((local[:, 0] + half) / (2 * half) * cells).astype(int)
         inside = (row >= 0) & (row < cells) & (column >= 0) & (column < cells)
+        row, column, local = row[inside], column[inside], local[inside]
+        top = np.full((cells, cells), -np.inf)
+        np.maximum.at(top, (row, column), local[:, 2])
+        inside = local[:, 2] >= top[row, column] - config.layer_m
         counts = np.zeros((cells, cells))
         np.add.at(counts, (row[inside], column[inside]), 1)
         sums = np.zeros((cells, cells, 3))
@@ -318,6 +325,55 @@ def test_grid_matches_a_plain_loop(view: CameraView) -> None:
         np.testing.assert_array_equal(seen[index], counts > 0)
         mean = sums / np.maximum(counts, 1)[..., None] / 0.025
         np.testing.assert_allclose(cloud[index], mean, atol=1e-5)
+
+
+def test_what_stands_above_is_seen_and_what_lies_under_an_edge_is_not_mixed_in(
+    view: CameraView,
+) -> None:
+    """On the table beside a ball of 100 mm: a cell holds the ball or the table, none both."""
+    config = SensingConfig()
+    beside = at(0.06, 0.0, 0.0)[None]
+    cloud, seen = sub_clouds(view.depth_m, view.camera, beside, config, 0.025)
+    height_m = 0.025 * cloud[0, ..., 2][seen[0]]
+    assert height_m.max() > 2 * config.grid_depth_m
+    assert (height_m > -0.001).all()
+    lower = config.model_copy(update={"grid_height_m": config.grid_depth_m})
+    blind, _ = sub_clouds(view.depth_m, view.camera, beside, lower, 0.025)
+    assert 0.025 * blind[..., 2].max() <= config.grid_depth_m + 1e-6
+    # An edge of the cube: with all of their points its cells hang between its top and its foot.
+    edge = at(-0.05125, 0.0, 0.1)[None]  # in the middle of a cell
+    apart, both = (
+        sub_clouds(view.depth_m, view.camera, edge, with_layer, 0.025)
+        for with_layer in (
+            config.model_copy(update={"grid_depth_m": 0.11}),
+            config.model_copy(update={"grid_depth_m": 0.11, "layer_m": 1.0}),
+        )
+    )
+    between = [
+        ((0.025 * c[0, ..., 2] < -0.01) & (0.025 * c[0, ..., 2] > -0.09) & s[0]).sum()
+        for c, s in (apart, both)
+    ]
+    assert between[0] == 0 < between[1]
+
+
+def test_shown_whole_is_a_ball_whose_every_point_is_in_the_picture(view: CameraView) -> None:
+    """Against the picture's own projection of points all over each ball."""
+    rng = np.random.default_rng(3)
+    centres, radius = rng.uniform(-0.7, 0.7, (400, 3)) * [1, 1, 0.2], 0.04
+    shell = rng.normal(size=(3000, 3))
+    shell *= radius / np.linalg.norm(shell, axis=1, keepdims=True)
+    camera = view.camera
+    world = centres[:, None] + shell
+    local = transform_points(invert(camera.world_from_camera), world.reshape(-1, 3))
+    pixels = local @ camera.intrinsics.T
+    column, row = (pixels[:, i] / pixels[:, 2] for i in (0, 1))
+    inside = (column >= 0) & (column <= camera.width_px) & (row >= 0) & (row <= camera.height_px)
+    whole = inside.reshape(len(centres), -1).all(axis=1)
+    found = shown_whole(camera, centres, radius)
+    assert 0.1 < whole.mean() < 0.9
+    assert not (found & ~whole).any()
+    # 3000 points do not touch a face that cuts less than a hair off the ball.
+    assert (shown_whole(camera, centres, 0.97 * radius) >= whole).all()
 
 
 def test_a_flat_top_is_seen_whole_and_a_blind_camera_sees_nothing(view: CameraView) -> None:

@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from schemas.softgrip.v1 import tensor_pb2 as schemas_dot_softgrip_dot_v1_dot_tensor__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n!schemas/softgrip/v1/samples.proto\x12\x0bsoftgrip.v1\x1a schemas/softgrip/v1/tensor.proto\"\xb6\x02\n\x0bSampleBatch\x12\"\n\x05\x63loud\x18\x01 \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12\'\n\ncloud_mask\x18\x02 \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12$\n\x07quality\x18\x03 \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12\x14\n\x0cobject_names\x18\x04 \x03(\t\x12)\n\x0cobject_index\x18\x05 \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12(\n\x0bshape_class\x18\x06 \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12\"\n\x05level\x18\x07 \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12%\n\x08pressure\x18\x08 \x01(\x0b\x32\x13.softgrip.v1.Tensorb\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n!schemas/softgrip/v1/samples.proto\x12\x0bsoftgrip.v1\x1a schemas/softgrip/v1/tensor.proto\"\x8b\x03\n\x0bSampleBatch\x12\"\n\x05\x63loud\x18\x01 \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12\'\n\ncloud_mask\x18\x02 \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12$\n\x07quality\x18\x03 \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12\x14\n\x0cobject_names\x18\x04 \x03(\t\x12)\n\x0cobject_index\x18\x05 \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12(\n\x0bshape_class\x18\x06 \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12\"\n\x05level\x18\x07 \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12%\n\x08pressure\x18\x08 \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12,\n\x0fproposal_weight\x18\t \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12%\n\x08pictures\x18\n \x01(\x0b\x32\x13.softgrip.v1.Tensorb\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -33,5 +33,5 @@ _builder.BuildTopDescriptorsAndMessages(DESCRIPTOR, 'schemas.softgrip.v1.samples
 if not _descriptor._USE_C_DESCRIPTORS:
   DESCRIPTOR._loaded_options = None
   _globals['_SAMPLEBATCH']._serialized_start=85
-  _globals['_SAMPLEBATCH']._serialized_end=395
+  _globals['_SAMPLEBATCH']._serialized_end=480
 # @@protoc_insertion_point(module_scope)

@@ -8,7 +8,7 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class SampleBatch(_message.Message):
-    __slots__ = ("cloud", "cloud_mask", "quality", "object_names", "object_index", "shape_class", "level", "pressure")
+    __slots__ = ("cloud", "cloud_mask", "quality", "object_names", "object_index", "shape_class", "level", "pressure", "proposal_weight", "pictures")
     CLOUD_FIELD_NUMBER: _ClassVar[int]
     CLOUD_MASK_FIELD_NUMBER: _ClassVar[int]
     QUALITY_FIELD_NUMBER: _ClassVar[int]
@@ -17,6 +17,8 @@ class SampleBatch(_message.Message):
     SHAPE_CLASS_FIELD_NUMBER: _ClassVar[int]
     LEVEL_FIELD_NUMBER: _ClassVar[int]
     PRESSURE_FIELD_NUMBER: _ClassVar[int]
+    PROPOSAL_WEIGHT_FIELD_NUMBER: _ClassVar[int]
+    PICTURES_FIELD_NUMBER: _ClassVar[int]
     cloud: _tensor_pb2.Tensor
     cloud_mask: _tensor_pb2.Tensor
     quality: _tensor_pb2.Tensor
@@ -25,4 +27,6 @@ class SampleBatch(_message.Message):
     shape_class: _tensor_pb2.Tensor
     level: _tensor_pb2.Tensor
     pressure: _tensor_pb2.Tensor
-    def __init__(self, cloud: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., cloud_mask: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., quality: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., object_names: _Optional[_Iterable[str]] = ..., object_index: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., shape_class: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., level: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., pressure: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ...) -> None: ...
+    proposal_weight: _tensor_pb2.Tensor
+    pictures: _tensor_pb2.Tensor
+    def __init__(self, cloud: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., cloud_mask: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., quality: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., object_names: _Optional[_Iterable[str]] = ..., object_index: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., shape_class: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., level: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., pressure: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., proposal_weight: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., pictures: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ...) -> None: ...
