@@ -11,7 +11,7 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact
 from pipeline.artifacts.grasp_messages import (
@@ -27,7 +27,7 @@ from pipeline.artifacts.object_messages import read_objects
 from pipeline.artifacts.scene_messages import read_placed, read_scene, scene_count
 from pipeline.artifacts.sharding import is_current, shard_entry, shard_path, write_index
 from pipeline.clutter.scene import ClutterScene, PlacedObject
-from pipeline.config import RunConfig, SensingConfig
+from pipeline.config import RunConfig
 from pipeline.errors import SceneError
 from pipeline.execution import (
     StageContext,
@@ -201,10 +201,24 @@ def synthesize(
         (disturb(view, rng) if config.sensing.disturbed else view.depth_m, view.camera)
         for view in scene.views
     ]
+    surfaces_seen = [
+        visible_surface(view, rays, body_ids, config.gripper.pad.radius_m) for view in scene.views
+    ]
+    able = [
+        number
+        for number, surface in enumerate(surfaces_seen)
+        if len(surface.contacts(config.grasps.seen_angle_max_rad))
+    ]
+    if not able:
+        raise SceneError(
+            f"No camera of scene {scene.scene_id} sees a surface face on and whole in its picture",
+            "Raise grasps.seen_angle_max_rad, or change where the cameras stand",
+        )
     batches = []
-    for number, view in enumerate(scene.views):
-        share = wanted // len(scene.views) + (number < wanted % len(scene.views))
-        grasps = grasps_of_view(number, view, measured, rays, body_ids, config, share, rng)
+    for number, share in zip(able, spread_evenly(wanted, len(able)), strict=True):
+        view = scene.views[number]
+        kept = kept_grasps(surfaces_seen[number], rays, body_ids, config, share, rng)
+        grasps = with_clouds(*kept, measured[number], measured, config, rng)
         index = np.array([index_of_body[int(body)] for body in grasps.body_id], dtype=np.int64)
         origin = GraspOrigin(
             scene_id=scene.scene_id,
@@ -230,28 +244,42 @@ def ray_scene(
     return RayScene([*bodies, table]), np.array([*(item.body_id for item in placed), 0])
 
 
-def grasps_of_view(
-    number: int,
-    view: CameraView,
-    measured: list[Picture],
+def kept_grasps(
+    surface: VisibleSurface,
     rays: RayScene,
     body_ids: np.ndarray,
     config: RunConfig,
     wanted: int,
     rng: np.random.Generator,
-) -> LabelledGrasps:
-    """Propose, label, balance, and cut the sub clouds of what is kept.
-
-    measured : the disturbed pictures of all views, this one's at ``number``.
-    """
-    surface = visible_surface(view, rays, body_ids, config.gripper.pad.radius_m)
+) -> tuple[Candidates, LabelBatch, Float[np.ndarray, " n"]]:
+    """Propose, label and balance: what is kept, with the chance that each had to be."""
     tried = int(np.ceil(wanted * config.grasps.oversampling))
     candidates, labels = label_rounds(surface, rays, body_ids, config, tried, rng)
     kept, probability = flattened(labels.q, wanted, config.grasps.balance, rng)
-    candidates, labels = candidates.take(kept), labels.take(kept)
-    merged = rng.random(len(kept)) < config.grasps.merged_share
+    return candidates.take(kept), labels.take(kept), probability
+
+
+def with_clouds(
+    candidates: Candidates,
+    labels: LabelBatch,
+    probability: Float[np.ndarray, " n"],
+    picture: Picture,
+    pictures: list[Picture],
+    config: RunConfig,
+    rng: np.random.Generator,
+) -> LabelledGrasps:
+    """S-1.14, S-1.15: transform and desample, from all pictures for some, from one for the rest.
+
+    probability : with which each was kept. picture : of the view that proposed them.
+    """
+    merged = rng.random(len(candidates)) < config.grasps.merged_share
     frames, radius_m = candidates.world_from_contact, config.gripper.pad.radius_m
-    cloud, mask = cut_clouds(measured, number, frames, merged, config.sensing, radius_m)
+    cells = config.sensing.grid_cells
+    cloud = np.empty((len(merged), cells, cells, 3), dtype=np.float32)
+    mask = np.empty((len(merged), cells, cells), dtype=np.bool_)
+    for rows, seen in ((merged, pictures), (~merged, [picture])):
+        found = merged_sub_clouds(seen, frames[rows], config.sensing, radius_m)
+        cloud[rows], mask[rows] = found
     first_touch = frames.copy()
     first_touch[:, :3, 3] += labels.touch_height_m[:, None] * first_touch[:, :3, 2]
     return LabelledGrasps(
@@ -272,26 +300,8 @@ def grasps_of_view(
         cloud=cloud,
         cloud_mask=mask,
         touch_height_m=labels.touch_height_m,
-        pictures=np.where(merged, len(measured), 1),
+        pictures=np.where(merged, len(pictures), 1),
     )
-
-
-def cut_clouds(
-    measured: list[Picture],
-    number: int,
-    world_from_contact: Float[np.ndarray, "n 4 4"],
-    merged: Bool[np.ndarray, " n"],
-    sensing: SensingConfig,
-    radius_m: float,
-) -> tuple[Float[np.ndarray, "n g g 3"], Bool[np.ndarray, "n g g"]]:
-    """S-1.14, S-1.15: transform and desample, from all pictures where ``merged``, else from one."""
-    count, cells = len(merged), sensing.grid_cells
-    cloud = np.empty((count, cells, cells, 3), dtype=np.float32)
-    mask = np.empty((count, cells, cells), dtype=np.bool_)
-    for rows, pictures in ((merged, measured), (~merged, [measured[number]])):
-        frames = world_from_contact[rows]
-        cloud[rows], mask[rows] = merged_sub_clouds(pictures, frames, sensing, radius_m)
-    return cloud, mask
 
 
 def label_rounds(
@@ -302,15 +312,13 @@ def label_rounds(
     tried: int,
     rng: np.random.Generator,
 ) -> tuple[Candidates, LabelBatch]:
-    """S-1.04 - S-1.12 in two rounds: over all that is seen, then near what is rare."""
+    """S-1.04 - S-1.12 in two rounds: over all that is seen face on, then near what is rare.
+
+    surface : with at least one of its `contacts`.
+    """
     pad = pad_of(config)
     tried_on = surface.body_id[surface.contacts(config.grasps.seen_angle_max_rad)]
     bodies = np.unique(tried_on)
-    if len(bodies) == 0:
-        raise SceneError(
-            "A camera sees no surface face on and whole in its picture",
-            "Raise grasps.seen_angle_max_rad, or change where the cameras stand",
-        )
     parts = {int(body): surface.of_body(body) for body in bodies}
     first = tried - int(tried * config.grasps.nearby_share)
     candidates = joined(

@@ -45,7 +45,7 @@ from pipeline.network.family import (
     multiply_adds,
     standard_error,
 )
-from pipeline.network.figures import error_by_class, mean_absolute_error
+from pipeline.network.figures import error_by_group, mean_absolute_error
 from pipeline.network.ga_cnn import build_network, parameter_count
 from pipeline.network.inference import predict
 from pipeline.network.timing import milliseconds_a_grasp
@@ -157,7 +157,7 @@ def member_figures(
         test_mae=mean_absolute_error(usual, test.quality),
         test_mae_single=mean_absolute_error(single, test.quality),
         test_mae_averaged=mean_absolute_error(averaged, test.quality),
-        by_class=error_by_class(usual, test.quality, CLASSES[test.shape_class]),
+        by_class=error_by_group(usual, test.quality, CLASSES[test.shape_class]),
         parameters=parameter_count(trained.network),
         multiply_adds=multiply_adds(trained.network),
     )

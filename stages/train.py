@@ -9,6 +9,7 @@ from collections import Counter
 from functools import partial, update_wrapper
 
 import numpy as np
+from jaxtyping import Float
 from loguru import logger
 
 from pipeline.artifacts import ArtifactWriter, publish_bytes
@@ -28,7 +29,7 @@ from pipeline.network.control_inference import ControlPredictor, checked_against
 from pipeline.network.export import export_onnx_bytes
 from pipeline.network.figures import (
     calibration,
-    error_by_class,
+    error_by_group,
     error_by_quality_bin,
     mean_absolute_error,
     weighted_error,
@@ -132,8 +133,9 @@ def test_figures(
         mean_predictor_mae=mean_predictor_mae(train_set.quality, quality),
         mean_predictor_mae_as_proposed=mean_predictor_mae_as_proposed(train_set, test_set),
         seal_ratio_mae=mean_absolute_error(by_seal, quality),
-        by_class=error_by_class(predicted, quality, shape_class),
-        by_pictures=error_by_class(predicted, quality, np.asarray(test_set.pictures)),
+        by_class=error_by_group(predicted, quality, shape_class),
+        by_pictures=error_by_pictures(predicted, test_set),
+        first_proposals=int((np.asarray(test_set.proposal_weight) > 0).sum()),
         count_by_class=dict(Counter(shape_class.tolist())),
         by_tenth=[found.mae for found in error_by_quality_bin(predicted, quality)],
         calibration=[
@@ -143,6 +145,18 @@ def test_figures(
         train_count=len(train_set),
         val_count=len(val_set),
     )
+
+
+def error_by_pictures(
+    predicted: Float[np.ndarray, " n"], test_set: Samples
+) -> dict[str, tuple[float, int]]:
+    """Error and samples by how many pictures their clouds were cut from."""
+    counts = Counter(np.asarray(test_set.pictures).tolist())
+    errors = error_by_group(predicted, np.asarray(test_set.quality), np.asarray(test_set.pictures))
+    return {
+        f"{pictures} picture{'s' if pictures > 1 else ''}": (errors[str(pictures)], count)
+        for pictures, count in sorted(counts.items())
+    }
 
 
 def mean_predictor_mae_as_proposed(train_set: Samples, test_set: Samples) -> float | None:
@@ -240,7 +254,7 @@ def summary(
         "mean_predictor_mae_as_proposed": figures.mean_predictor_mae_as_proposed,
         "seal_ratio_mae": figures.seal_ratio_mae,
         "test_mae_by_class": figures.by_class,
-        "test_mae_by_pictures": figures.by_pictures,
+        "test_mae_by_pictures": {name: e for name, (e, _) in figures.by_pictures.items()},
         "test_mae_by_tenth_of_q": figures.by_tenth,
         "device": chosen_device(stage.config.train.device, ranks).type,
         "processes": ranks.count,

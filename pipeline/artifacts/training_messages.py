@@ -26,7 +26,8 @@ class TestFigures:
     (`Samples.proposal_weight`), where labels are not balanced; None where that is unknown.
     train_count, val_count : samples that the network learned from and was chosen by.
     mean_predictor_mae, seal_ratio_mae : of the baselines. by_class : class name → error.
-    by_pictures : how many pictures a cloud was cut from → error.
+    by_pictures : "1 picture", "3 pictures", ... that clouds were cut from → error, samples.
+    first_proposals : samples of the first round, those that ``mae_as_proposed`` is over.
     by_tenth : error by tenth of q, None where empty.
     calibration : by tenth of q-hat: mean q-hat, mean q (None where empty), count.
     """
@@ -42,7 +43,8 @@ class TestFigures:
     mean_predictor_mae_as_proposed: float | None
     seal_ratio_mae: float
     by_class: dict[str, float]
-    by_pictures: dict[str, float]
+    by_pictures: dict[str, tuple[float, int]]
+    first_proposals: int
     count_by_class: dict[str, int]
     by_tenth: Sequence[float | None]
     calibration: Sequence[tuple[float | None, float | None, int]]
@@ -74,7 +76,7 @@ def result_message(trained: TrainedNetwork, figures: TestFigures) -> TrainingRes
         mean_predictor_mae=figures.mean_predictor_mae,
         baseline_mae={"mean": figures.mean_predictor_mae, "seal_ratio": figures.seal_ratio_mae},
         test_mae_by_class=figures.by_class,
-        test_mae_by_pictures=figures.by_pictures,
+        test_mae_by_pictures={name: error for name, (error, _) in figures.by_pictures.items()},
         test_mae_by_tenth=to_tensor(_numbers(figures.by_tenth)),
         calibration=to_tensor(np.array([_numbers(row) for row in figures.calibration])),
         test_quality=to_tensor(figures.quality.astype(np.float32)),

@@ -102,7 +102,9 @@ class PolicyConfig(Section):
         0.03, ge=0, description="this near to the contact nothing is corrected any more [m]"
     )
     look_m: float = Field(
-        0.06, gt=0, description="radius looked at around the aim: a sub cloud and a correction [m]"
+        0.06,
+        gt=0,
+        description="radius looked at around the aim: the pad and a correction [m]",
     )
     another_m: float = Field(
         0.03,

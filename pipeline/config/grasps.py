@@ -7,6 +7,8 @@ from pydantic import Field, model_validator
 
 from pipeline.config.section import Section
 
+CELL_SIDE = 0.1  # side of a sub cloud's cell in units of r_G: 60 mm in 24 cells over 25 mm
+
 SolverName = Literal["structured", "piqp-sparse", "piqp-dense", "clarabel"]
 
 
@@ -74,7 +76,7 @@ class GraspsConfig(Section):
         math.radians(50),
         gt=0,
         le=math.pi / 2,
-        description="largest angle of the approach off the direction to the camera [rad]",
+        description="largest angle at which a camera sees a contact or a tilted approach [rad]",
     )
     normal_radius_m: float = Field(
         0.010, gt=0, description="surface normal is the mean over this radius [m]"

@@ -8,6 +8,7 @@ count, log level) belongs in it.
 import difflib
 import hashlib
 import json
+import math
 import operator
 import re
 import tomllib
@@ -19,7 +20,7 @@ from pydantic import Field, ValidationError, model_validator
 from pipeline.config.cameras import CamerasConfig
 from pipeline.config.dataset import DatasetConfig
 from pipeline.config.evaluation import EvaluateConfig, RecordingConfig
-from pipeline.config.grasps import GraspsConfig, GripperConfig, SensingConfig
+from pipeline.config.grasps import CELL_SIDE, GraspsConfig, GripperConfig, SensingConfig
 from pipeline.config.learning import NetworkConfig, ShardsConfig, SweepConfig, TrainConfig
 from pipeline.config.objects import ObjectsConfig, SplitConfig
 from pipeline.config.scenes import ScenesConfig
@@ -55,6 +56,25 @@ class RunConfig(Section):
     def _stem_is_above_the_pad(self) -> Self:
         if self.evaluate.hand.stem_begins_m < self.gripper.pad.altitude_m:
             raise ValueError("evaluate.hand.stem_begins_m is within gripper.pad.altitude_m")
+        return self
+
+    @model_validator(mode="after")
+    def _clouds_show_what_labels_meet(self) -> Self:
+        if self.sensing.grid_height_m < self.grasps.clearance_m:
+            raise ValueError(
+                "sensing.grid_height_m is less than grasps.clearance_m: labels would meet "
+                "obstacles that no cloud shows"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _cells_are_as_the_network_reads_them(self) -> Self:
+        cell = self.sensing.grid_side_m / self.sensing.grid_cells / self.gripper.pad.radius_m
+        if not math.isclose(cell, CELL_SIDE, rel_tol=1e-6):
+            raise ValueError(
+                f"sensing.grid_side_m / grid_cells is {cell:.4g} of gripper.pad.radius_m, and the "
+                f"network reads cells of {CELL_SIDE}"
+            )
         return self
 
 

@@ -2,9 +2,9 @@
 
 A contact c is a point of the object's surface that the camera can see, for a
 grasp is only ever tried on what was observed; and where the camera sees what
-the pad would meet: around c the picture does not end, and d_G is not far off
-the direction to the camera, from where half the surface under the pad would be
-hidden. The approach d_G is the mean surface normal around c, as the policy
+the pad would meet: around c the picture does not end, and the surface at c and
+every tilted d_G face the camera, for at a slant half of what lies under the pad
+is hidden. The approach d_G is the mean surface normal around c, as the policy
 estimates it (Supplement VI), tilted off it for part of the proposals; the spin
 about d_G is uniform. A second round proposes near grasps whose labels are
 rare, for labels fall from a full seal to none within a few millimetres. Which
@@ -24,7 +24,7 @@ from pipeline.config.grasps import GraspsConfig
 class Proposal(IntEnum):
     """The rule that proposed a grasp: the sampler's bias, sample by sample."""
 
-    NORMAL = 0  # contact uniform over the visible surface, approach along the mean normal
+    NORMAL = 0  # contact uniform over what is seen face on, approach along the mean normal
     TILTED = 1  # the same, approach tilted off the normal
     NEARBY = 2  # a small step from a grasp with a rare label
 
@@ -35,14 +35,14 @@ class VisibleSurface:
 
     points_m : (n, 3) on the true surface. normals : (n, 3) unit, outward.
     body_id : (n,) which object a point lies on. eye_m : (3,) where the camera is.
-    inside : (n,) the picture shows all around the point, as far as the pad reaches.
+    whole : (n,) the picture shows all around the point, as far as the pad reaches.
     """
 
     points_m: Float[np.ndarray, "n 3"]
     normals: Float[np.ndarray, "n 3"]
     body_id: Int[np.ndarray, " n"]
     eye_m: Float[np.ndarray, " 3"]
-    inside: Bool[np.ndarray, " n"]
+    whole: Bool[np.ndarray, " n"]
 
     def of_body(self, body_id: int) -> "VisibleSurface":
         """The part that lies on one object."""
@@ -52,13 +52,13 @@ class VisibleSurface:
             points_m=self.points_m[mine],
             normals=self.normals[mine],
             body_id=self.body_id[mine],
-            inside=self.inside[mine],
+            whole=self.whole[mine],
         )
 
     def contacts(self, angle_max_rad: float) -> Int[np.ndarray, " k"]:
         """Indices of the points where a pad may be tried: whole in the picture, seen face on."""
         return np.flatnonzero(
-            self.inside & self.seen_face_on(self.points_m, self.normals, angle_max_rad)
+            self.whole & self.seen_face_on(self.points_m, self.normals, angle_max_rad)
         )
 
     def seen_face_on(
@@ -112,7 +112,7 @@ def joined(parts: list[Candidates]) -> Candidates:
 def propose(
     surface: VisibleSurface, count: int, config: GraspsConfig, rng: np.random.Generator
 ) -> Candidates:
-    """First round: ``count`` grasps of one object, contacts uniform over what is seen of it.
+    """First round: ``count`` grasps of one object, contacts uniform over what is seen face on.
 
     S-1.04 draws the contact c, S-1.05 the approach d_G, S-1.06 the spin about it.
 
@@ -126,8 +126,9 @@ def propose(
     approach = tilt_directions(normals, tilt, rng)
     # Turned too far from the camera: take the normal itself.
     hidden = ~surface.seen_face_on(surface.points_m[at], approach, config.seen_angle_max_rad)
-    approach = np.where(hidden[:, None], normals, approach)
-    tilt = np.where(hidden, 0.0, tilt)
+    tilted &= ~hidden
+    approach = np.where(tilted[:, None], approach, normals)
+    tilt = np.where(tilted, tilt, 0.0)
     return Candidates(
         contact_frames(surface.points_m[at], approach, rng.uniform(0, 2 * np.pi, count)),
         surface.body_id[at],
@@ -146,7 +147,8 @@ def propose_nearby(
 
     surface : points of the object that all ``grasps`` are on. The new contact is one of its
     `contacts` within ``config.nearby_radius_m`` of the old one (the old one itself where
-    none is), the new approach within ``config.nearby_tilt_rad`` of the old approach.
+    none is), the new approach within ``config.nearby_tilt_rad`` of the old approach, or the
+    mean normal where that would lean too far off it or away from the camera.
     """
     count = len(grasps)
     contacts = surface.points_m[surface.contacts(config.seen_angle_max_rad)]

@@ -36,6 +36,8 @@ def write_parquet(
             "level": samples.level.astype(np.uint8),
             "shape_class": _words(samples.shape_class, CLASSES),
             "object": _words(samples.object_index, names),
+            "pictures": samples.pictures.astype(np.uint8),
+            "proposal_weight": samples.proposal_weight.astype(np.float32),
         }
     )
     table = table.replace_schema_metadata({"softgrip.cells": str(cells)})

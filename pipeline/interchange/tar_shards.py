@@ -1,5 +1,6 @@
 """Training samples as WebDataset tars: a tar a shard, three files a sample."""
 
+import math
 from pathlib import Path
 
 import webdataset
@@ -16,12 +17,14 @@ def write_webdataset(
 ) -> None:
     """One tar: ``<key>.cloud.npy`` (f2), ``<key>.mask.npy`` (b1) and ``<key>.json`` a sample.
 
-    Clouds are (g, g, 3) in units of r_G; the json has q, p, level, class and object.
+    Clouds are (g, g, 3) in units of r_G; the json has q, p, level, class, object, how many pictures
+    the cloud was cut from, and the first proposals it stands for (null where that is unknown).
     names : what ``object_index`` points into. Keys are ``prefix`` and a
     number, which is ``first`` for the first sample.
     """
     with published(path) as scratch, webdataset.TarWriter(str(scratch), mtime=0) as tar:
         for row in range(len(samples)):
+            weight = float(samples.proposal_weight[row])
             tar.write(
                 {
                     "__key__": f"{prefix}{first + row:08d}",
@@ -33,6 +36,8 @@ def write_webdataset(
                         "level": int(samples.level[row]),
                         "shape_class": CLASSES[samples.shape_class[row]],
                         "object": names[samples.object_index[row]],
+                        "pictures": int(samples.pictures[row]),
+                        "proposal_weight": weight if math.isfinite(weight) else None,
                     },
                 }
             )

@@ -20,7 +20,8 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from pipeline.network.measured_drape import CELL, draped_gap
+from pipeline.config.grasps import CELL_SIDE
+from pipeline.network.measured_drape import draped_gap
 
 # What the input's channels hold, in order; pairs that turn with the cloud stand first.
 Channels = tuple[str, ...]
@@ -87,9 +88,9 @@ def network_input(
         "seen": mask.float(),
     }
     if "x_in_cell" in channels:
-        middles = (torch.arange(z.shape[1], device=z.device) - (z.shape[1] - 1) / 2) * CELL
-        found["x_in_cell"] = torch.where(mask, (x - middles) / (CELL / 2), 0.0)
-        found["y_in_cell"] = torch.where(mask, (y - middles[:, None]) / (CELL / 2), 0.0)
+        middles = (torch.arange(z.shape[1], device=z.device) - (z.shape[1] - 1) / 2) * CELL_SIDE
+        found["x_in_cell"] = torch.where(mask, (x - middles) / (CELL_SIDE / 2), 0.0)
+        found["y_in_cell"] = torch.where(mask, (y - middles[:, None]) / (CELL_SIDE / 2), 0.0)
     for gap, contact, under in (
         ("pad_gap", "pad_contact", mask & (radius <= PAD_RADIUS)),
         ("gap", "contact", mask),

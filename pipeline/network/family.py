@@ -20,7 +20,6 @@ from jaxtyping import Float
 from torch.utils.flop_counter import FlopCounterMode
 
 from pipeline.config.learning import NetworkConfig, SweepConfig
-from pipeline.network.canonical import CHANNELS
 from pipeline.network.ga_cnn import GaCnn, build_network
 
 Variant = Literal["ga-cnn", "no attention", "no augmentation"]
@@ -85,7 +84,7 @@ def members(sweep: SweepConfig, of_run: NetworkConfig, seed: int) -> list[Member
 
 def multiply_adds(network: GaCnn) -> int:
     """Multiplications with addition that one grasp costs, as the convolutions' sizes say."""
-    example = torch.zeros(1, len(CHANNELS), _CELLS, _CELLS)
+    example = torch.zeros(1, len(network.channels), _CELLS, _CELLS)
     with FlopCounterMode(display=False) as counter, torch.inference_mode():
         network.eval()(example)
     return int(counter.get_total_flops()) // 2

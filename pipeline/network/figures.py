@@ -86,15 +86,15 @@ def error_by_quality_bin(
     return tuple(rows)
 
 
-def error_by_class(
+def error_by_group(
     predicted: Float[np.ndarray, " n"],
     quality: Float[np.ndarray, " n"],
-    classes: Num[np.ndarray, " n"] | np.ndarray,
+    groups: Num[np.ndarray, " n"] | np.ndarray,
 ) -> dict[str, float]:
-    """Mean |q̂ − q| of each class that occurs, keyed by its name, in order."""
+    """Mean |q̂ − q| of each group that occurs, keyed by its name, in order."""
     return {
-        str(name): mean_absolute_error(predicted[classes == name], quality[classes == name])
-        for name in np.unique(classes)
+        str(name): mean_absolute_error(predicted[groups == name], quality[groups == name])
+        for name in np.unique(groups)
     }
 
 

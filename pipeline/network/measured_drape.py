@@ -18,11 +18,11 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 from torch.nn import functional
 
-# One cell of the grid in units of r_G: 60 mm in 24 cells over 25 mm.
-CELL = 0.1
+from pipeline.config.grasps import CELL_SIDE
+
 # H / r_G of Table I.
 REACH = 1.2
-_SWEEPS = round(REACH / CELL)
+_SWEEPS = round(REACH / CELL_SIDE)
 # Lower than any height that matters, finite so that sums of it stay comparable.
 _NOTHING = -1e3
 
@@ -33,7 +33,7 @@ def draped_gap(z: Float[Tensor, "b h w"], seen: Bool[Tensor, "b h w"]) -> Float[
     Parameters
     ----------
     z : heights of the cells in GCS, in units of r_G.
-    seen : cells that hold a measured point; the others hold nothing up.
+    seen : cells that hold a measured point under the pad; the others hold nothing up.
 
     Returns
     -------
@@ -56,4 +56,4 @@ def _carried(z: Float[Tensor, "b h w"]) -> Float[Tensor, "b h w"]:
     corner = torch.maximum(beside[:, :-2], beside[:, 2:])
     above = torch.maximum(padded[:, :-2, 1:-1], padded[:, 2:, 1:-1])
     edge = torch.maximum(beside[:, 1:-1], above)
-    return torch.maximum(edge - CELL, corner - math.sqrt(2.0) * CELL)
+    return torch.maximum(edge - CELL_SIDE, corner - math.sqrt(2.0) * CELL_SIDE)

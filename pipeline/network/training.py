@@ -28,7 +28,7 @@ from torch.nn.parallel import DistributedDataParallel
 from pipeline.config.learning import NetworkConfig, TrainConfig
 from pipeline.errors import MachineError
 from pipeline.execution.progress import progress
-from pipeline.network.canonical import SYMMETRIES, apply_symmetry, network_input
+from pipeline.network.canonical import CHANNELS, SYMMETRIES, apply_symmetry, network_input
 from pipeline.network.ga_cnn import GaCnn, build_network
 from pipeline.network.loading import (
     RawBatch,
@@ -327,6 +327,7 @@ def _identity(
         "version": STATE_VERSION,
         "train": config.model_dump(mode="json"),
         "network": network.model_dump(mode="json"),
+        "channels": CHANNELS,
         "seed": seed,
         "train_set": train_set.sha256(),
         "val_set": val_set.sha256(),

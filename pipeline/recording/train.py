@@ -89,9 +89,13 @@ def result_table(figures: TestFigures) -> str:
         ("mean predictor over the same", figures.mean_predictor_mae_as_proposed),
     ]
     rows += [
-        (name, f"{error:.4f}", len(figures.quality))
+        (name, f"{error:.4f}", figures.first_proposals)
         for name, error in as_proposed
         if error is not None
+    ]
+    rows += [
+        (f"GA-CNN on clouds cut from {pictures}", f"{error:.4f}", count)
+        for pictures, (error, count) in figures.by_pictures.items()
     ]
     rows += [
         (f"GA-CNN on {name} objects", f"{error:.4f}", figures.count_by_class[name])

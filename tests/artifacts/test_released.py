@@ -17,7 +17,8 @@ from pipeline.artifacts.scene_messages import read_scenes
 from pipeline.artifacts.sharding import listed_shards, read_index
 from pipeline.artifacts.training_messages import CHECKPOINT, EXPORT
 from pipeline.network.checkpoint import load_checkpoint_bytes
-from pipeline.network.control_inference import ControlPredictor
+from pipeline.network.control_inference import ControlPredictor, checked_against
+from pipeline.network.inference import predict
 from schemas.compatibility import read_released, versions
 from schemas.softgrip.v1.evaluation_pb2 import Attempt, LevelResult
 from schemas.softgrip.v1.grasps_pb2 import GraspBatch
@@ -63,8 +64,8 @@ def test_grasps_and_samples(released: Path) -> None:
                 assert set(np.unique(grasps.status)) <= set(range(len(origin.status_names)))
     for shard in listed_shards(released / "shards.mcap"):
         with open_artifact(shard) as artifact:
-            for _, message in artifact.messages(SampleBatch):
-                found = samples_of(message)
+            for _, batch in artifact.messages(SampleBatch):
+                found = samples_of(batch)
                 samples += len(found)
                 # 0.1.0 cut each cloud from one picture and did not say how grasps were drawn.
                 if released.name.endswith("-0.1.0"):
@@ -85,9 +86,16 @@ def test_training(released: Path) -> None:
         predictor = ControlPredictor(artifact.attachment(EXPORT), threads=1)
     assert 0 < result.test_mae < 1
     assert network.config.layers == result.layers
-    cloud = np.zeros((1, 24, 24, 3), dtype=np.float16)
-    (predicted,) = predictor.predict(cloud, np.ones((1, 24, 24), dtype=bool))
-    assert 0 <= predicted <= 1
+    (shard, *_) = listed_shards(released / "shards.mcap", ["test"])
+    with open_artifact(shard) as artifact:
+        samples = samples_of(next(m for _, m in artifact.messages(SampleBatch)))
+    # Checkpoint and export agree, and on the samples they were tested on they predict what their
+    # run wrote down, which was a mean over the eight symmetries.
+    cloud, mask = samples.cloud.copy(), samples.cloud_mask.copy()
+    checked_against(predictor, network, cloud, mask, batch_size=64, threads=1)
+    averaged = predict(network, cloud, mask, 64, 1, average_symmetries=True)
+    written = from_tensor(result.test_prediction)[: len(samples)]
+    np.testing.assert_allclose(averaged, written, atol=1e-4)
 
 
 def test_evaluation(released: Path) -> None:

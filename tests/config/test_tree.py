@@ -50,6 +50,8 @@ def test_table_one_is_the_default_pad() -> None:
         ("[gripper.pad]\nseal_radius_m=0.1", r"must not exceed radius_m"),
         ("[gripper.pad]\naltitude_m=0.09", r"stem_begins_m is within gripper\.pad\.altitude_m"),
         ("[evaluate.hand]\nstem_radius_m=0.09", r"length_m must exceed stem_begins_m"),
+        ("[grasps]\nclearance_m=0.2", r"grid_height_m is less than grasps\.clearance_m"),
+        ("[sensing]\ngrid_cells=32", r"0\.075 of gripper\.pad\.radius_m, .* cells of 0\.1"),
     ],
 )
 def test_what_is_wrong_is_said(tmp_path: Path, text: str, said: str) -> None:

@@ -26,7 +26,10 @@ def test_the_page_shows_table_one_times_three() -> None:
     for name in scaled:
         assert large[name] == pytest.approx(TIMES * small[name]), name
     assert SHOWN.sensing.grid_side_m == pytest.approx(TIMES * RunConfig().sensing.grid_side_m)
-    assert SHOWN.sensing.grid_depth_m == pytest.approx(TIMES * RunConfig().sensing.grid_depth_m)
+    for name in ("grid_depth_m", "grid_height_m", "layer_m"):
+        expected = TIMES * getattr(RunConfig().sensing, name)
+        assert getattr(SHOWN.sensing, name) == pytest.approx(expected)
+    assert SHOWN.grasps.clearance_m == pytest.approx(TIMES * RunConfig().grasps.clearance_m)
     assert SHOWN.evaluate.hand.stem_begins_m > SHOWN.gripper.pad.altitude_m
 
 

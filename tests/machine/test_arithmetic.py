@@ -43,3 +43,23 @@ def test_products_are_those_of_one_kind_of_processor() -> None:
 
 def test_a_choice_made_outside_stands() -> None:
     assert product("import pipeline\n", "Sandybridge") == product("", "Sandybridge")
+
+
+@pytest.mark.parametrize("stage", ["scenes", "train"])
+def test_a_stage_settles_it_before_numpy_comes(stage: str) -> None:
+    """Run by hand as `python -m stages.<stage>`, nothing has imported ``pipeline`` before."""
+    script = (
+        "import os, sys\n"
+        "class Watch:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'numpy':\n"
+        "            print('pipeline' in sys.modules, os.environ.get('OPENBLAS_CORETYPE'))\n"
+        "sys.meta_path.insert(0, Watch())\n"
+        f"import stages.{stage}\n"
+    )
+    env = {name: value for name, value in os.environ.items() if name != "OPENBLAS_CORETYPE"}
+    done = subprocess.run(
+        [sys.executable, "-c", script], env=env, capture_output=True, text=True, check=True
+    )
+    chosen = "Haswell" if CPU.is_file() and "avx2" in CPU.read_text() else None
+    assert done.stdout.split() == ["True", str(chosen)]

@@ -12,7 +12,7 @@ import torch
 
 from pipeline.errors import ArtifactError, ContentError
 from pipeline.execution import run_in_order
-from pipeline.network.canonical import network_input
+from pipeline.network.canonical import CHANNELS, network_input
 from pipeline.network.control_inference import ControlPredictor, checked_against
 from pipeline.network.ga_cnn import GaCnn, build_network
 from tests.network.planes import planes_with_holes
@@ -83,7 +83,7 @@ def asked_in_a_worker(data: bytes) -> tuple[bytes, set[frozenset[int]]]:
 
 
 def test_networks_that_cannot_be_run_are_refused(data: bytes) -> None:
-    sides = ("batch", 8, 24, 24)
+    sides = ("batch", len(CHANNELS), 24, 24)
     for bad in (
         *(b"", b"not a network at all", data[: len(data) // 2]),
         model([node("Relu", "x")], sides=sides, gives=sides),

@@ -10,7 +10,7 @@ from pipeline.errors import ArtifactError
 from pipeline.network.figures import (
     BINS,
     calibration,
-    error_by_class,
+    error_by_group,
     error_by_quality_bin,
     mean_absolute_error,
     weighted_error,
@@ -40,7 +40,7 @@ def test_bins_by_hand_with_one_in_the_last() -> None:
 
 def test_classes_by_hand() -> None:
     classes = np.array(["typical", "basic", "basic", "typical"])
-    errors = error_by_class(PREDICTED, QUALITY, classes)
+    errors = error_by_group(PREDICTED, QUALITY, classes)
     assert list(errors) == ["basic", "typical"]
     assert errors["basic"] == pytest.approx(0.075)
     assert errors["typical"] == pytest.approx(0.1)

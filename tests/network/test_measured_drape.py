@@ -7,10 +7,10 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.config.grasps import PadConfig
+from pipeline.config.grasps import CELL_SIDE, PadConfig
 from pipeline.gripper.draping import drape
 from pipeline.gripper.pad import build_pad
-from pipeline.network.measured_drape import CELL, REACH, draped_gap
+from pipeline.network.measured_drape import REACH, draped_gap
 from tests.network.planes import CELLS, grid_xy
 
 EVERYWHERE = torch.ones(1, CELLS, CELLS, dtype=torch.bool)
@@ -23,7 +23,7 @@ def gap_as_defined(z: np.ndarray, seen: np.ndarray) -> np.ndarray:
     for i, j in np.argwhere(seen):
         across, down = np.abs(rows - i), np.abs(columns - j)
         distance = np.maximum(across, down) + (math.sqrt(2) - 1) * np.minimum(across, down)
-        reached = np.where(seen, z, -np.inf) - CELL * distance
+        reached = np.where(seen, z, -np.inf) - CELL_SIDE * distance
         gap[i, j] = min(reached.max() - z[i, j], REACH)
     return gap
 
@@ -51,7 +51,7 @@ def test_over_a_step_the_pad_comes_down_as_far_as_it_goes_sideways() -> None:
     x, _ = grid_xy()
     z = torch.from_numpy(np.where(x < 0, 0.0, -0.55).astype(np.float32))[None]
     gap = draped_gap(z, EVERYWHERE)[0, CELLS // 2]
-    beyond = 0.55 - CELL * np.arange(1, CELLS // 2 + 1)
+    beyond = 0.55 - CELL_SIDE * np.arange(1, CELLS // 2 + 1)
     np.testing.assert_allclose(gap[CELLS // 2 :].numpy(), np.maximum(beyond, 0.0), atol=1e-5)
 
 

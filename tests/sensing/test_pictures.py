@@ -38,7 +38,7 @@ from pipeline.sensing.depth_noise import NOISE_MODELS, cosine_of_incidence, dist
 from pipeline.sensing.ray_rendering import RayRenderer
 from pipeline.sensing.rendering import Renderer, new_renderer, rendered
 from pipeline.sensing.sapien_rendering import SapienRenderer
-from pipeline.sensing.sub_cloud import sub_clouds
+from pipeline.sensing.sub_cloud import merged_sub_clouds, sub_clouds
 from pipeline.sensing.view import CameraView, normals_of
 
 CAMERAS = static_cameras(StaticCameraConfig())
@@ -300,12 +300,24 @@ def test_an_ideal_sensor_measures_the_picture_itself(view: CameraView) -> None:
     np.testing.assert_array_equal(clean, view.depth_m)
 
 
-def test_grid_matches_a_plain_loop(view: CameraView) -> None:
-    """The oracle sorts all points of the picture into cells, one grasp at a time."""
+@pytest.mark.parametrize("azimuths_rad", [(0.0,), (0.0, 2.0, 4.0)])
+def test_grid_matches_a_plain_loop(
+    azimuths_rad: tuple[float, ...], objects: Mapping[str, CatalogueObject]
+) -> None:
+    """The oracle sorts all points of the pictures into cells, one grasp at a time."""
     config = SensingConfig()
     poses = np.stack([at(-0.1, 0.0, 0.1), at(0.1, 0.01, 0.1), at(-0.05, 0.0, 0.1)])
-    cloud, seen = sub_clouds(view.depth_m, view.camera, poses, config, 0.025)
-    points, _, _ = points_of_depth(view.depth_m.astype(np.float64), view.camera, 1)
+    beside = StaticCameraConfig(
+        azimuths_rad=azimuths_rad, elevations_rad=(1.0,) * len(azimuths_rad)
+    )
+    views = rendered(
+        CUBE_AND_BALL, objects, static_cameras(beside), RayRenderer(ScenesConfig())
+    ).views
+    pictures = [(view.depth_m.astype(np.float64), view.camera) for view in views]
+    cloud, seen = merged_sub_clouds(pictures, poses, config, 0.025)
+    if len(pictures) == 1:
+        np.testing.assert_array_equal(sub_clouds(*pictures[0], poses, config, 0.025)[0], cloud)
+    points = np.concatenate([points_of_depth(*picture, 1)[0] for picture in pictures])
     cells, half = config.grid_cells, config.grid_side_m / 2
     for index, pose in enumerate(poses):
         local = points - pose[:3, 3]

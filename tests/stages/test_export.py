@@ -143,6 +143,8 @@ def check_facts(row: dict, samples: Samples, index: int) -> None:
     assert row["level"] == samples.level[index]
     assert row["shape_class"] == CLASSES[samples.shape_class[index]]
     assert isinstance(row["object"], str)
+    assert row["pictures"] == samples.pictures[index]
+    assert row["proposal_weight"] == pytest.approx(float(samples.proposal_weight[index]))
 
 
 @pytest.mark.parametrize("wanted", Format)

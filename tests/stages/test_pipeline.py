@@ -74,12 +74,25 @@ def test_samples_are_whole_and_span_good_and_bad(run: RunFolder) -> None:
         assert (part.cloud[~part.cloud_mask] == 0).all()
 
 
+def test_half_the_clouds_are_cut_from_all_pictures_and_show_more(run: RunFolder) -> None:
+    parts = [read_split(run.artifact("shards"), split) for split in ("train", "val", "test")]
+    pictures = np.concatenate([part.pictures for part in parts])
+    seen = np.concatenate([part.cloud_mask for part in parts]).mean(axis=(1, 2))
+    views = {len(scene.views) for scene in read_scenes(run.artifact("scenes"))}
+    assert set(pictures.tolist()) == {1, *views}
+    # Binomial(240, 1/2): four standard deviations are 0.13.
+    assert abs((pictures == 1).mean() - 0.5) < 0.13
+    assert seen[pictures > 1].mean() > seen[pictures == 1].mean() + 0.02
+
+
 def test_training_and_evaluation_report_what_they_did(run: RunFolder) -> None:
     with open_artifact(run.artifact("train")) as artifact:
         result = artifact.one(TrainingResult)
         assert artifact.attachment("ga_cnn.safetensors")
         assert artifact.attachment("ga_cnn.onnx")
     assert 0 < result.test_mae < 1
+    assert 0 < result.test_mae_as_proposed < 1
+    assert sorted(result.test_mae_by_pictures) == ["1 picture", "3 pictures"]
     with open_artifact(run.artifact("evaluate")) as artifact:
         attempts = [message for _, message in artifact.messages(Attempt)]
         levels = [message for _, message in artifact.messages(LevelResult, "/levels")]
