@@ -55,7 +55,7 @@ def test_learns_planes_with_holes_far_better_than_the_mean(
     config = TrainConfig(epochs=8, batch_size=64, learning_rate=4e-3, threads=1, device="cpu")
     seen: list[int] = []
     trained = train(
-        config, NETWORK, 0, learned, held_out, tmp_path, lambda metrics: seen.append(metrics.epoch)
+        config, NETWORK, 1, learned, held_out, tmp_path, lambda metrics: seen.append(metrics.epoch)
     )
     predicted = predict(trained.network, held_out.cloud, held_out.mask, 64, 1, False)
     mae = mean_absolute_error(predicted, held_out.quality)
