@@ -378,8 +378,8 @@ def visible_surface(
             "Change cameras.static.elevations_rad or azimuths_rad",
         )
     points = origin + hits.distance_m[seen, None] * directions[seen]
-    inside = shown_whole(view.camera, points, radius_m)
-    return VisibleSurface(points, rays.normals_at(hits)[seen], body[seen], origin, inside)
+    whole = shown_whole(view.camera, points, radius_m)
+    return VisibleSurface(points, rays.normals_at(hits)[seen], body[seen], origin, whole)
 
 
 def spread_evenly(total: int, parts: int) -> list[int]:

@@ -23,7 +23,12 @@ from pipeline.artifacts.training_messages import (
     result_message,
 )
 from pipeline.execution import StageContext, Summary, stage_command
-from pipeline.network.baselines import fit_monotone, mean_predictor_mae, seal_ratio
+from pipeline.network.baselines import (
+    fit_monotone,
+    mean_predictor_mae,
+    seal_ratio,
+    weighted_mean_predictor_mae,
+)
 from pipeline.network.checkpoint import save_checkpoint_bytes
 from pipeline.network.control_inference import ControlPredictor, checked_against
 from pipeline.network.export import export_onnx_bytes
@@ -131,7 +136,9 @@ def test_figures(
         mae_single=mean_absolute_error(single, quality),
         mae_as_proposed=weighted_error(predicted, quality, test_set.proposal_weight),
         mean_predictor_mae=mean_predictor_mae(train_set.quality, quality),
-        mean_predictor_mae_as_proposed=mean_predictor_mae_as_proposed(train_set, test_set),
+        mean_predictor_mae_as_proposed=weighted_mean_predictor_mae(
+            train_set.quality, train_set.proposal_weight, quality, test_set.proposal_weight
+        ),
         seal_ratio_mae=mean_absolute_error(by_seal, quality),
         by_class=error_by_group(predicted, quality, shape_class),
         by_pictures=error_by_pictures(predicted, test_set),
@@ -157,16 +164,6 @@ def error_by_pictures(
         f"{pictures} picture{'s' if pictures > 1 else ''}": (errors[str(pictures)], count)
         for pictures, count in sorted(counts.items())
     }
-
-
-def mean_predictor_mae_as_proposed(train_set: Samples, test_set: Samples) -> float | None:
-    """The mean predictor's error where both its mean and its error are over first proposals."""
-    weight = train_set.proposal_weight.astype(np.float64)
-    if not weight.sum() > 0:
-        return None
-    mean = np.average(train_set.quality, weights=weight)
-    constant = np.full(len(test_set), mean)
-    return weighted_error(constant, test_set.quality, test_set.proposal_weight)
 
 
 def export_for_control(stage: StageContext, trained: TrainedNetwork, test_set: Samples) -> bytes:

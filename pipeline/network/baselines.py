@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.optimize import isotonic_regression
 
-from pipeline.network.figures import mean_absolute_error
+from pipeline.network.figures import mean_absolute_error, weighted_error
 
 # Below so many cells a plane is not fitted: the ratio is 0.
 _FEWEST_CELLS = 3
@@ -18,6 +18,20 @@ def mean_predictor_mae(
     """Mean |q̂ − q| of predicting the training samples' mean for every test sample."""
     constant = np.full(test_quality.shape, train_quality.mean(dtype=np.float64))
     return mean_absolute_error(constant, test_quality)
+
+
+def weighted_mean_predictor_mae(
+    train_quality: Float[np.ndarray, " m"],
+    train_weight: Float[np.ndarray, " m"],
+    test_quality: Float[np.ndarray, " n"],
+    test_weight: Float[np.ndarray, " n"],
+) -> float | None:
+    """The same, mean and error both weighted; None where weights are unknown or all zero."""
+    weight = train_weight.astype(np.float64)
+    if not weight.sum() > 0:
+        return None
+    constant = np.full(test_quality.shape, np.average(train_quality, weights=weight))
+    return weighted_error(constant, test_quality, test_weight)
 
 
 def seal_ratio(

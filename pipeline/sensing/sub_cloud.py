@@ -51,10 +51,9 @@ def merged_sub_clouds(
     ]
     tops = np.full((count, cells, cells), -np.inf)
     sums = np.zeros((count, cells, cells, 4))
-    for picture in seen_by:
-        _raise_tops(*picture, box, tops)
-    for picture in seen_by:
-        _add(*picture, box, config.layer_m, tops, sums)
+    for adding in (False, True):
+        for picture in seen_by:
+            _gather(*picture, box, config.layer_m, adding, tops, sums)
     cloud = np.zeros((count, cells, cells, 3), dtype=np.float32)
     seen = np.zeros((count, cells, cells), dtype=np.bool_)
     _means(sums, radius_m, cloud, seen)
@@ -62,41 +61,20 @@ def merged_sub_clouds(
 
 
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]
-def _raise_tops(
-    depth: Float[np.ndarray, "h w"],
-    k: Float[np.ndarray, "3 3"],
-    camera_from_contact: Float[np.ndarray, "b 4 4"],
-    box: tuple[float, float, float],
-    tops: Float[np.ndarray, "b g g"],
-) -> None:
-    """Raise each cell's highest point by those of one depth image."""
-    cells = tops.shape[1]
-    for b in range(len(camera_from_contact)):
-        pose = camera_from_contact[b]
-        left, right, top, bottom = _window(depth.shape, k, pose, box)
-        across, origin = _axes(k, pose)
-        for row in range(top, bottom + 1):
-            down = _of_row(row, k, pose)
-            for column in range(left, right + 1):
-                z = depth[row, column]
-                if z > 0.0:
-                    point = _placed(z, column, across, down, origin)
-                    i, j = _cell(point, box, cells)
-                    if i >= 0:
-                        tops[b, i, j] = max(tops[b, i, j], point[2])
-
-
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
-def _add(
+def _gather(
     depth: Float[np.ndarray, "h w"],
     k: Float[np.ndarray, "3 3"],
     camera_from_contact: Float[np.ndarray, "b 4 4"],
     box: tuple[float, float, float],
     layer: float,
+    adding: bool,
     tops: Float[np.ndarray, "b g g"],
     sums: Float[np.ndarray, "b g g 4"],
 ) -> None:
-    """Add the points of one depth image, and their number, to the sums of the cells they top."""
+    """Raise each cell's highest point by those of one depth image; or, when all images have done
+    so, add the points near it, and their number, to the cell's sums. (A generator of the points
+    serves both passes more plainly and takes 3.6 times as long.)
+    """
     cells = tops.shape[1]
     for b in range(len(camera_from_contact)):
         pose = camera_from_contact[b]
@@ -109,7 +87,11 @@ def _add(
                 if z > 0.0:
                     point = _placed(z, column, across, down, origin)
                     i, j = _cell(point, box, cells)
-                    if i >= 0 and point[2] >= tops[b, i, j] - layer:
+                    if i < 0:
+                        continue
+                    if not adding:
+                        tops[b, i, j] = max(tops[b, i, j], point[2])
+                    elif point[2] >= tops[b, i, j] - layer:
                         for axis in range(3):
                             sums[b, i, j, axis] += point[axis]
                         sums[b, i, j, 3] += 1.0

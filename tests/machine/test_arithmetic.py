@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 CPU = Path("/proc/cpuinfo")
+HAS_AVX2 = CPU.is_file() and "avx2" in CPU.read_text()
 PRODUCT = """
 import numpy as np
 a = np.random.default_rng(0).standard_normal((3, 40, 37))
@@ -21,18 +22,21 @@ print(hashlib.sha256(b"".join(p.tobytes() for p in products)).hexdigest())
 
 def product(before: str, kernels: str | None) -> str:
     """Digest of a product of matrices in an interpreter of its own."""
+    told = said(before + PRODUCT, kernels)
+    assert len(told.strip()) == len(hashlib.sha256().hexdigest())
+    return told
+
+
+def said(script: str, kernels: str | None) -> str:
+    """What a script prints in an interpreter of its own, where nothing else chose kernels."""
     env = {name: value for name, value in os.environ.items() if name != "OPENBLAS_CORETYPE"}
     if kernels is not None:
         env["OPENBLAS_CORETYPE"] = kernels
-    command = [sys.executable, "-c", before + PRODUCT]
-    done = subprocess.run(command, env=env, capture_output=True, text=True, check=True)
-    assert len(done.stdout.strip()) == len(hashlib.sha256().hexdigest())
-    return done.stdout
+    command = [sys.executable, "-c", script]
+    return subprocess.run(command, env=env, capture_output=True, text=True, check=True).stdout
 
 
-@pytest.mark.skipif(
-    not CPU.is_file() or "avx2" not in CPU.read_text(), reason="this processor has no AVX2"
-)
+@pytest.mark.skipif(not HAS_AVX2, reason="this processor has no AVX2")
 def test_products_are_those_of_one_kind_of_processor() -> None:
     pinned = product("import pipeline\n", None)
     assert pinned == product("import stages.scenes\n", None)
@@ -57,9 +61,5 @@ def test_a_stage_settles_it_before_numpy_comes(stage: str) -> None:
         "sys.meta_path.insert(0, Watch())\n"
         f"import stages.{stage}\n"
     )
-    env = {name: value for name, value in os.environ.items() if name != "OPENBLAS_CORETYPE"}
-    done = subprocess.run(
-        [sys.executable, "-c", script], env=env, capture_output=True, text=True, check=True
-    )
-    chosen = "Haswell" if CPU.is_file() and "avx2" in CPU.read_text() else None
-    assert done.stdout.split() == ["True", str(chosen)]
+    chosen = "Haswell" if HAS_AVX2 else None
+    assert said(script, None).split() == ["True", str(chosen)]

@@ -6,7 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from pipeline.network.baselines import fit_monotone, mean_predictor_mae, seal_ratio
+from pipeline.network.baselines import (
+    fit_monotone,
+    mean_predictor_mae,
+    seal_ratio,
+    weighted_mean_predictor_mae,
+)
 from pipeline.network.figures import mean_absolute_error
 from tests.network.planes import SEAL_RADIUS, grid_xy, planes_with_holes
 
@@ -51,3 +56,12 @@ def test_monotone_regressor_rises_and_keeps_the_mean(pair: np.ndarray) -> None:
     regressor = fit_monotone(feature, quality)
     assert bool(np.all(np.diff(regressor.quality) >= -1e-12))
     assert regressor.predict(feature).mean() == pytest.approx(quality.mean())
+
+
+def test_the_weighted_mean_is_weighted_in_what_it_predicts_and_in_its_error() -> None:
+    learned, test = np.array([0.0, 1.0]), np.array([0.25, 1.0])
+    found = weighted_mean_predictor_mae(learned, np.array([3.0, 1.0]), test, np.array([1.0, 2.0]))
+    assert found == pytest.approx((1 * 0.0 + 2 * 0.75) / 3)
+    even = weighted_mean_predictor_mae(learned, np.ones(2), test, np.ones(2))
+    assert even == pytest.approx(mean_predictor_mae(learned, test))
+    assert weighted_mean_predictor_mae(learned, np.full(2, np.nan), test, np.ones(2)) is None
