@@ -7,13 +7,15 @@ the number of workers.
 
 import multiprocessing
 import signal
+import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import resource_tracker
-from typing import Literal, TypeVar
+from types import FrameType
+from typing import Any, Literal, TypeVar
 
 from pipeline.errors import SoftgripError
 
@@ -21,6 +23,8 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 Executor = Literal["local", "ray"]
+
+_Handler = Callable[[int, FrameType | None], Any]
 
 AHEAD_PER_WORKER = 2  # items in flight, so that a slow consumer bounds memory
 
@@ -82,21 +86,35 @@ def _submitted(
     The pool closes its pipes when a worker dies; starting another then fails on the closed ones.
     """
     try:
-        with _deaf_to_interrupts():
+        with _interrupts_put_off():
             return pool.submit(job, item)
     except (ValueError, OSError) as error:
         raise BrokenProcessPool(f"no further worker could be started: {error}") from error
 
 
 @contextmanager
-def _deaf_to_interrupts() -> Iterator[None]:
+def _interrupts_put_off() -> Iterator[None]:
     """What starts meanwhile never hears SIGINT, not even while its interpreter starts.
 
     A terminal sends it to the whole group; ending the run is the driver's part. The driver hears
-    it once it is out of here.
+    it, or SIGTERM, once it is out of here: half a started worker would complain of its driver.
+    The mask is what a worker inherits. It does not keep the driver from being interrupted, for a
+    thread of a native library may take the signal, and Python then handles it in this one.
     """
+    heard: list[int] = []
+    handlers: dict[signal.Signals, _Handler] = {}
+    if threading.current_thread() is threading.main_thread():  # the one where handlers run
+        for number in (signal.SIGINT, signal.SIGTERM):
+            handler = signal.getsignal(number)
+            if callable(handler):
+                handlers[number] = handler
+                signal.signal(number, lambda number, _: heard.append(number))
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        for number, handler in handlers.items():
+            signal.signal(number, handler)
+        for taken in heard:
+            signal.raise_signal(taken)

@@ -1,10 +1,12 @@
 """Results come in the order of the items, whoever computes them."""
 
 import multiprocessing
+import multiprocessing.util
 import os
 import signal
+import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
 
@@ -82,6 +84,33 @@ def test_the_driver_hears_an_interrupt_that_came_while_a_worker_started() -> Non
         list(run_in_order(square, items(), 2))
     assert not multiprocessing.active_children()
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
+
+@pytest.mark.usefixtures("hears_interrupts")
+def test_an_interrupt_that_another_thread_takes_leaves_no_half_started_worker(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Python interrupts the main thread, blocked or not: between a worker's start and its job."""
+    start: Callable[..., int] = multiprocessing.util.spawnv_passfds
+
+    def interrupted_start(*given: object) -> int:
+        pid = start(*given)
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.1)
+        return pid
+
+    monkeypatch.setattr(multiprocessing.util, "spawnv_passfds", interrupted_start)
+    done = threading.Event()
+    other = threading.Thread(target=done.wait)
+    other.start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            list(run_in_order(square, range(8), 2))
+    finally:
+        done.set()
+        other.join()
+    assert not multiprocessing.active_children()
+    assert "Traceback" not in capfd.readouterr().err
 
 
 @pytest.mark.parametrize("workers", [1, 2])
