@@ -45,7 +45,7 @@ PAD_RADIUS = 1.0
 # label's 0.1 mm.
 CONTACT_GAP = 0.02
 # The reference height is taken over the middle third of the grid.
-_REFERENCE_PART = 3
+REFERENCE_PART = 3
 
 SYMMETRIES = 8
 
@@ -109,8 +109,8 @@ def reference_height(z: Float[Tensor, "b h w"], mask: Bool[Tensor, "b h w"]) -> 
     middle values the lower is taken: a measured one, whatever the order of the cells.
     """
     h, w = z.shape[1:]
-    rows = slice(h // _REFERENCE_PART, h - h // _REFERENCE_PART)
-    columns = slice(w // _REFERENCE_PART, w - w // _REFERENCE_PART)
+    rows = slice(h // REFERENCE_PART, h - h // REFERENCE_PART)
+    columns = slice(w // REFERENCE_PART, w - w // REFERENCE_PART)
     middle = _masked_median(z[:, rows, columns].flatten(1), mask[:, rows, columns].flatten(1))
     empty = ~mask[:, rows, columns].flatten(1).any(dim=1)
     if bool(empty.any()):

@@ -7,7 +7,8 @@ import torch
 from jaxtyping import Bool, Float
 
 from pipeline.errors import ArtifactError, ContentError
-from pipeline.network.canonical import network_input
+from pipeline.network.canonical import CHANNELS, network_input
+from pipeline.network.control_input import control_input
 from pipeline.network.export import GRID, REMEDY, check_onnx_bytes
 from pipeline.network.ga_cnn import GaCnn
 from pipeline.network.inference import predict
@@ -24,8 +25,6 @@ LARGEST_DIFFERENCE = 1e-4
 # Grasps a stream takes at a time. With 4 a grasp costs some 6 % more; with 16 some 4 % less, but
 # two streams are then unequally busy with the 48 candidates of a control step.
 _PART = 8
-# Grasps whose input is prepared together, while the streams run those before.
-_PREPARED = 32
 
 
 class ControlPredictor:
@@ -57,26 +56,25 @@ class ControlPredictor:
     ) -> Float[np.ndarray, " n"]:
         """Predicted quality q̂ in [0, 1]; clouds and masks as for ``inference.predict``."""
         predicted = np.empty(len(cloud), dtype=np.float32)
-        # One thread prepares the input: on shared cores a second one costs more than it saves.
-        with reproducible(threads=1), torch.inference_mode():
-            for start in range(0, len(cloud), _PREPARED):
-                some = slice(start, start + _PREPARED)
-                inputs = network_input(
-                    torch.from_numpy(cloud[some]), torch.from_numpy(mask[some]), self._channels
-                )
-                self._start(inputs.numpy(), predicted[some])
+        for start in range(0, len(cloud), _PART):
+            some = slice(start, start + _PART)
+            part = self._input(cloud[some], mask[some])
+            if len(part) < _PART:
+                part = np.pad(part, ((0, _PART - len(part)), (0, 0), (0, 0), (0, 0)))
+            self._streams.start_async({0: part}, predicted[some])
         self._streams.wait_all()
         return predicted
 
-    def _start(
-        self, inputs: Float[np.ndarray, "n c h w"], predicted: Float[np.ndarray, " n"]
-    ) -> None:
-        """Hand inputs to the streams in parts, which fill ``predicted`` as they come to them."""
-        for start in range(0, len(inputs), _PART):
-            part = inputs[start : start + _PART]
-            if len(part) < _PART:
-                part = np.pad(part, ((0, _PART - len(part)), (0, 0), (0, 0), (0, 0)))
-            self._streams.start_async({0: part}, predicted[start : start + _PART])
+    def _input(
+        self, cloud: Float[np.ndarray, "n h w 3"], mask: Bool[np.ndarray, "n h w"]
+    ) -> Float[np.ndarray, "n c h w"]:
+        """The network's input; networks of older channels are not in a hurry."""
+        if self._channels == CHANNELS:
+            return control_input(cloud, mask)
+        with reproducible(threads=1), torch.inference_mode():
+            return network_input(
+                torch.from_numpy(cloud), torch.from_numpy(mask), self._channels
+            ).numpy()
 
 
 def checked_against(

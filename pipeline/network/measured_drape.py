@@ -22,9 +22,9 @@ from pipeline.config.grasps import CELL_SIDE
 
 # H / r_G of Table I.
 REACH = 1.2
-_SWEEPS = round(REACH / CELL_SIDE)
+SWEEPS = round(REACH / CELL_SIDE)
 # Lower than any height that matters, finite so that sums of it stay comparable.
-_NOTHING = -1e3
+NOTHING = -1e3
 
 
 def draped_gap(z: Float[Tensor, "b h w"], seen: Bool[Tensor, "b h w"]) -> Float[Tensor, "b h w"]:
@@ -39,9 +39,9 @@ def draped_gap(z: Float[Tensor, "b h w"], seen: Bool[Tensor, "b h w"]) -> Float[
     -------
     z(v) - z_s(v) >= 0, at most ``REACH``: 0 is a cell the pad lies on.
     """
-    surface = torch.where(seen, z, _NOTHING)
+    surface = torch.where(seen, z, NOTHING)
     draped = surface
-    for _ in range(_SWEEPS):
+    for _ in range(SWEEPS):
         draped = torch.maximum(draped, _carried(draped))
     return torch.where(seen, draped - surface, 0.0).clamp(max=REACH)
 
@@ -51,7 +51,7 @@ def _carried(z: Float[Tensor, "b h w"]) -> Float[Tensor, "b h w"]:
 
     Shifted maxima: forty times as fast on a CPU as max-pooling one channel.
     """
-    padded = functional.pad(z, (1, 1, 1, 1), value=_NOTHING)
+    padded = functional.pad(z, (1, 1, 1, 1), value=NOTHING)
     beside = torch.maximum(padded[:, :, :-2], padded[:, :, 2:])
     corner = torch.maximum(beside[:, :-2], beside[:, 2:])
     above = torch.maximum(padded[:, :-2, 1:-1], padded[:, 2:, 1:-1])

@@ -2,7 +2,9 @@
 
 from pathlib import Path
 
+import onnx
 import pytest
+from torch import nn
 
 import pipeline
 from pipeline.errors import ContentError
@@ -16,6 +18,15 @@ def test_equal_networks_export_equal_bytes_without_a_word_of_the_machine(
     assert export_onnx_bytes(network) == data
     assert str(Path(pipeline.__path__[0]).parent).encode() not in data
     assert b"ga_cnn.py" not in data
+
+
+def test_an_export_is_of_convolutions_and_leaves_its_network_as_it_was(
+    network: GaCnn, data: bytes
+) -> None:
+    operators = {node.op_type for node in onnx.load_from_string(data).graph.node}
+    assert "Conv" in operators
+    assert not {"Gemm", "MatMul"} & operators
+    assert any(isinstance(layer, nn.Linear) for layer in network.modules())
 
 
 def test_bytes_that_are_no_export_are_refused(data: bytes) -> None:

@@ -1,0 +1,158 @@
+"""The network's input for control: what ``canonical.network_input`` makes, compiled.
+
+A control step prepares some fifty clouds. As tensors each of their seventy operations is a pass
+over memory; here a cloud stays in the cache from its first cell to its last.
+"""
+
+import math
+from typing import NamedTuple
+
+import numba
+import numpy as np
+from jaxtyping import Bool, Float
+
+from pipeline.config.grasps import CELL_SIDE
+from pipeline.network.canonical import (
+    CONTACT_GAP,
+    PAD_RADIUS,
+    REFERENCE_PART,
+    Z_FINE_LIMIT,
+    Z_LIMIT,
+)
+from pipeline.network.measured_drape import NOTHING, REACH, SWEEPS
+
+# In the order of ``canonical.CHANNELS``.
+_X, _Y, _X_IN_CELL, _Y_IN_CELL, _Z, _Z_FINE, _RADIUS, _SEEN, _PAD_GAP, _PAD_CONTACT = range(10)
+_CHANNELS = 10
+
+
+class _Lengths(NamedTuple):
+    """What is defined elsewhere, in single precision, as the tensors are.
+
+    Handed over: the disk cache would keep a constant of another module as it was when compiled.
+    """
+
+    beside: np.float32 = np.float32(CELL_SIDE)
+    across: np.float32 = np.float32(math.sqrt(2.0) * CELL_SIDE)
+    half_cell: np.float32 = np.float32(CELL_SIDE / 2)
+    limit: np.float32 = np.float32(Z_LIMIT)
+    fine_limit: np.float32 = np.float32(Z_FINE_LIMIT)
+    pad_radius: np.float32 = np.float32(PAD_RADIUS)
+    contact_gap: np.float32 = np.float32(CONTACT_GAP)
+    nothing: np.float32 = np.float32(NOTHING)
+    reach: np.float32 = np.float32(REACH)
+
+
+_LENGTHS = _Lengths()
+
+
+def control_input(
+    cloud: Float[np.ndarray, "b h w 3"], mask: Bool[np.ndarray, "b h w"]
+) -> Float[np.ndarray, "b c h w"]:
+    """Canonical input of GA-CNN, of ``canonical.CHANNELS``, in single precision.
+
+    cloud, mask : as for ``canonical.network_input``.
+    """
+    count, height, width = mask.shape
+    inputs = np.zeros((count, _CHANNELS, height, width), dtype=np.float32)
+    middles = (np.arange(width, dtype=np.float32) - np.float32((width - 1) / 2)) * _LENGTHS.beside
+    _fill(
+        np.asarray(cloud, dtype=np.float32), mask, middles, inputs, _LENGTHS, SWEEPS, REFERENCE_PART
+    )
+    return inputs
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)  # type: ignore[untyped-decorator]
+def _fill(
+    cloud: Float[np.ndarray, "b h w 3"],
+    mask: Bool[np.ndarray, "b h w"],
+    middles: Float[np.ndarray, " w"],
+    inputs: Float[np.ndarray, "b c h w"],
+    lengths: _Lengths,
+    sweeps: int,
+    reference_part: int,
+) -> None:
+    """Every channel of every cloud; what is unseen stays zero."""
+    _, height, width = mask.shape
+    fine = lengths.fine_limit
+    under = np.empty((height, width), dtype=np.bool_)
+    # With a border that holds nothing, so that every cell has eight neighbours.
+    draped = np.empty((height + 2, width + 2), dtype=np.float32)
+    swept = np.empty_like(draped)
+    for b in range(len(mask)):
+        seen, out = mask[b], inputs[b]
+        reference = _reference_height(cloud[b, :, :, 2], seen, reference_part)
+        draped[:] = lengths.nothing
+        swept[:] = lengths.nothing
+        for i in range(height):
+            for j in range(width):
+                under[i, j] = False
+                if not seen[i, j]:
+                    continue
+                x, y, z = cloud[b, i, j, 0], cloud[b, i, j, 1], cloud[b, i, j, 2] - reference
+                out[_X, i, j], out[_Y, i, j] = x, y
+                out[_X_IN_CELL, i, j] = (x - middles[j]) / lengths.half_cell
+                out[_Y_IN_CELL, i, j] = (y - middles[i]) / lengths.half_cell
+                out[_Z, i, j] = min(max(z, -lengths.limit), lengths.limit)
+                out[_Z_FINE, i, j] = min(max(z, -fine), fine) / fine
+                radius = np.sqrt(x * x + y * y)
+                out[_RADIUS, i, j] = radius
+                out[_SEEN, i, j] = 1.0
+                if radius <= lengths.pad_radius:
+                    under[i, j] = True
+                    draped[i + 1, j + 1] = z
+        for _ in range(sweeps):
+            _carry(draped, swept, lengths)
+            draped, swept = swept, draped
+        for i in range(height):
+            for j in range(width):
+                if under[i, j]:
+                    z = cloud[b, i, j, 2] - reference
+                    gap = min(draped[i + 1, j + 1] - z, lengths.reach)
+                    out[_PAD_GAP, i, j] = gap / fine
+                    out[_PAD_CONTACT, i, j] = 1.0 if gap <= lengths.contact_gap else 0.0
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)  # type: ignore[untyped-decorator]
+def _carry(
+    z: Float[np.ndarray, "h2 w2"], carried: Float[np.ndarray, "h2 w2"], lengths: _Lengths
+) -> None:
+    """One sweep of ``measured_drape.draped_gap``: what the highest of nine cells holds up."""
+    for i in range(1, z.shape[0] - 1):
+        for j in range(1, z.shape[1] - 1):
+            beside = max(max(z[i, j - 1], z[i, j + 1]), max(z[i - 1, j], z[i + 1, j]))
+            corner = max(
+                max(z[i - 1, j - 1], z[i - 1, j + 1]), max(z[i + 1, j - 1], z[i + 1, j + 1])
+            )
+            carried[i, j] = max(z[i, j], max(beside - lengths.beside, corner - lengths.across))
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)  # type: ignore[untyped-decorator]
+def _reference_height(
+    z: Float[np.ndarray, "h w"], seen: Bool[np.ndarray, "h w"], part: int
+) -> np.float32:
+    """``canonical.reference_height`` of one cloud."""
+    height, width = z.shape
+    rows, columns = height // part, width // part
+    middle = (slice(rows, height - rows), slice(columns, width - columns))
+    found = _masked(z[middle], seen[middle])
+    if len(found) == 0:
+        found = _masked(z, seen)
+    if len(found) == 0:
+        return np.float32(0.0)
+    found.sort()
+    median: np.float32 = found[(len(found) - 1) // 2]
+    return median
+
+
+@numba.njit(cache=True, error_model="numpy", nogil=True)  # type: ignore[untyped-decorator]
+def _masked(z: Float[np.ndarray, "h w"], seen: Bool[np.ndarray, "h w"]) -> Float[np.ndarray, " n"]:
+    """Heights of the seen cells."""
+    found = np.empty(z.size, dtype=np.float32)
+    count = 0
+    for i in range(z.shape[0]):
+        for j in range(z.shape[1]):
+            if seen[i, j]:
+                found[count] = z[i, j]
+                count += 1
+    return found[:count]
