@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float
 
 from pipeline.config.grasps import CELL_SIDE
 from pipeline.network.canonical import (
+    CHANNELS,
     CONTACT_GAP,
     PAD_RADIUS,
     REFERENCE_PART,
@@ -22,8 +23,9 @@ from pipeline.network.canonical import (
 from pipeline.network.measured_drape import NOTHING, REACH, SWEEPS
 
 # In the order of ``canonical.CHANNELS``.
-_X, _Y, _X_IN_CELL, _Y_IN_CELL, _Z, _Z_FINE, _RADIUS, _SEEN, _PAD_GAP, _PAD_CONTACT = range(10)
-_CHANNELS = 10
+_X, _Y, _X_IN_CELL, _Y_IN_CELL, _Z, _Z_FINE, _RADIUS, _SEEN, _PAD_GAP, _PAD_CONTACT = range(
+    len(CHANNELS)
+)
 
 
 class _Lengths(NamedTuple):
@@ -54,7 +56,7 @@ def control_input(
     cloud, mask : as for ``canonical.network_input``.
     """
     count, height, width = mask.shape
-    inputs = np.zeros((count, _CHANNELS, height, width), dtype=np.float32)
+    inputs = np.zeros((count, len(CHANNELS), height, width), dtype=np.float32)
     middles = (np.arange(width, dtype=np.float32) - np.float32((width - 1) / 2)) * _LENGTHS.beside
     _fill(
         np.asarray(cloud, dtype=np.float32), mask, middles, inputs, _LENGTHS, SWEEPS, REFERENCE_PART
@@ -75,18 +77,15 @@ def _fill(
     """Every channel of every cloud; what is unseen stays zero."""
     _, height, width = mask.shape
     fine = lengths.fine_limit
-    under = np.empty((height, width), dtype=np.bool_)
     # With a border that holds nothing, so that every cell has eight neighbours.
-    draped = np.empty((height + 2, width + 2), dtype=np.float32)
-    swept = np.empty_like(draped)
+    draped = np.full((height + 2, width + 2), lengths.nothing)
+    swept = draped.copy()
     for b in range(len(mask)):
         seen, out = mask[b], inputs[b]
         reference = _reference_height(cloud[b, :, :, 2], seen, reference_part)
         draped[:] = lengths.nothing
-        swept[:] = lengths.nothing
         for i in range(height):
             for j in range(width):
-                under[i, j] = False
                 if not seen[i, j]:
                     continue
                 x, y, z = cloud[b, i, j, 0], cloud[b, i, j, 1], cloud[b, i, j, 2] - reference
@@ -99,14 +98,13 @@ def _fill(
                 out[_RADIUS, i, j] = radius
                 out[_SEEN, i, j] = 1.0
                 if radius <= lengths.pad_radius:
-                    under[i, j] = True
                     draped[i + 1, j + 1] = z
         for _ in range(sweeps):
             _carry(draped, swept, lengths)
             draped, swept = swept, draped
         for i in range(height):
             for j in range(width):
-                if under[i, j]:
+                if seen[i, j] and out[_RADIUS, i, j] <= lengths.pad_radius:
                     z = cloud[b, i, j, 2] - reference
                     gap = min(draped[i + 1, j + 1] - z, lengths.reach)
                     out[_PAD_GAP, i, j] = gap / fine
@@ -135,24 +133,11 @@ def _reference_height(
     height, width = z.shape
     rows, columns = height // part, width // part
     middle = (slice(rows, height - rows), slice(columns, width - columns))
-    found = _masked(z[middle], seen[middle])
+    found = z[middle].flatten()[seen[middle].flatten()]
     if len(found) == 0:
-        found = _masked(z, seen)
+        found = z.flatten()[seen.flatten()]
     if len(found) == 0:
         return np.float32(0.0)
     found.sort()
     median: np.float32 = found[(len(found) - 1) // 2]
     return median
-
-
-@numba.njit(cache=True, error_model="numpy", nogil=True)  # type: ignore[untyped-decorator]
-def _masked(z: Float[np.ndarray, "h w"], seen: Bool[np.ndarray, "h w"]) -> Float[np.ndarray, " n"]:
-    """Heights of the seen cells."""
-    found = np.empty(z.size, dtype=np.float32)
-    count = 0
-    for i in range(z.shape[0]):
-        for j in range(z.shape[1]):
-            if seen[i, j]:
-                found[count] = z[i, j]
-                count += 1
-    return found[:count]

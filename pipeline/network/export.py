@@ -67,14 +67,13 @@ class _OneCell(nn.Module):
 
     def __init__(self, layer: nn.Linear) -> None:
         super().__init__()
-        self.convolution = nn.Conv2d(layer.in_features, layer.out_features, 1)
-        self.convolution.weight = nn.Parameter(layer.weight[:, :, None, None])
-        self.convolution.bias = layer.bias
+        self.kernel = nn.Parameter(layer.weight[:, :, None, None])
+        self.bias = layer.bias
 
     def forward(self, x: Float[Tensor, "b c"]) -> Float[Tensor, "b d"]:
         """The layer's output."""
-        found: Tensor = self.convolution(x.unsqueeze(2).unsqueeze(3))
-        return found.squeeze(3).squeeze(2)
+        cell = nn.functional.conv2d(x.unsqueeze(2).unsqueeze(3), self.kernel, self.bias)
+        return cell.squeeze(3).squeeze(2)
 
 
 def _without_matrix_products(network: GaCnn) -> GaCnn:
