@@ -122,6 +122,7 @@ lint: .venv/.ready
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
 	$(PY) -m mypy
+	.venv/bin/lint-imports --no-logo
 	$(PY) -m schemas.generate --check
 
 # Run ci on the embedded objects, whatever MESH_DIR says: they are the same everywhere.

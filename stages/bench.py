@@ -15,21 +15,20 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.artifacts import ArtifactWriter, publish_bytes
-from pipeline.artifacts.grasp_messages import GraspOrigin, LabelledGrasps, grasp_batch
-from pipeline.artifacts.object_messages import read_objects
-from pipeline.artifacts.sample_messages import Samples
-from pipeline.artifacts.scene_messages import read_scenes
 from pipeline.benchmarks import clutter, control, labelling, solvers, storage
 from pipeline.benchmarks import loading as batches
 from pipeline.benchmarks.clock import Laps
-from pipeline.clutter.scene import ClutterScene
 from pipeline.config import RunConfig, load_run_config
 from pipeline.config.grasps import SolverName
 from pipeline.execution import RunFolder, generator, run_command, run_in_order
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.shape import ShapeClass
-from pipeline.gripper.heights import pad_heights
+from pipeline.labelling.heights import pad_heights
+from pipeline.messages.grasps import GraspOrigin, LabelledGrasps, grasp_batch
+from pipeline.messages.objects import read_objects
+from pipeline.messages.samples import Samples
+from pipeline.messages.scenes import read_scenes
 from pipeline.network.control_inference import ControlPredictor, checked_against
 from pipeline.network.export import export_onnx_bytes
 from pipeline.network.ga_cnn import GaCnn, build_network
@@ -37,6 +36,7 @@ from pipeline.network.inference import predict
 from pipeline.network.timing import milliseconds_a_grasp
 from pipeline.sensing.depth_noise import disturb
 from pipeline.sensing.sub_cloud import sub_clouds
+from pipeline.world.scene import ClutterScene
 from stages.graph import RUNS_DIR
 from stages.grasps import (
     ROUND,

@@ -8,13 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact, publish_bytes
-from pipeline.artifacts.evaluation_messages import attempt_message
-from pipeline.artifacts.evaluation_results import Results, results_of
-from pipeline.artifacts.object_messages import read_objects
-from pipeline.artifacts.scene_messages import read_scenes
 from pipeline.artifacts.sharding import is_current
-from pipeline.artifacts.training_messages import EXPORT
-from pipeline.clutter.scene import ClutterScene
 from pipeline.config import RunConfig
 from pipeline.config.evaluation import PolicyName
 from pipeline.config.grasps import PadConfig
@@ -29,12 +23,18 @@ from pipeline.execution import (
     stage_command,
 )
 from pipeline.geometry.catalogue import CatalogueObject
+from pipeline.messages.evaluation import attempt_message
+from pipeline.messages.evaluation_results import Results, results_of
+from pipeline.messages.objects import read_objects
+from pipeline.messages.scenes import read_scenes
+from pipeline.messages.training import EXPORT
 from pipeline.network.control_inference import ControlPredictor
 from pipeline.recording.evaluate import blueprint, show_attempts, worst_first
 from pipeline.recording.recording import recording, spread
 from pipeline.recording.results import markdown
 from pipeline.recording.robot import ShownRobot
 from pipeline.simulation.picking import run_clutter
+from pipeline.world.scene import ClutterScene
 from schemas.softgrip.v1.evaluation_pb2 import Attempt, Comparison, LevelResult
 from stages.graph import EVALUATE, RUNS_DIR, inputs_of
 
@@ -143,7 +143,7 @@ def publish(
     text = markdown(results.levels, results.policies, results.comparisons)
     scale = stage.config.gripper.pad.radius_m / PadConfig().radius_m
     view = blueprint(stage.config.evaluate.robot == "iiwa14", scale)
-    with recording(stage.recording, stage.stage.name, stage.key.digest, view) as stream:
+    with recording(stage, view) as stream:
         show_attempts(stream, shown, names, meshes, text, shown_robot(stage.config))
     publish_bytes(stage.folder.path / "evaluate.md", text.encode())
     with ArtifactWriter(stage.output, stage.provenance()) as artifact:

@@ -18,9 +18,6 @@ from pipeline.artifacts import (
     publish_bytes,
     read_provenance,
 )
-from pipeline.artifacts.grasp_messages import grasps_of
-from pipeline.artifacts.object_messages import read_objects
-from pipeline.artifacts.sample_messages import Samples, joined_samples, samples_of
 from pipeline.artifacts.sharding import listed_shards
 from pipeline.config import load_run_config
 from pipeline.errors import ArtifactError, MachineError
@@ -29,6 +26,9 @@ from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.interchange.graspgen import write_graspgen, write_lists
 from pipeline.interchange.object_grasps import ObjectGrasps, base_in_object
 from pipeline.interchange.parquet_shards import write_parquet
+from pipeline.messages.grasps import grasps_of
+from pipeline.messages.objects import read_objects
+from pipeline.messages.samples import Samples, joined_samples, samples_of
 from schemas.softgrip.v1.grasps_pb2 import GraspBatch
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 from schemas.softgrip.v1.scenes_pb2 import Scene

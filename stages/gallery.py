@@ -10,17 +10,17 @@ import typer
 from loguru import logger
 
 from pipeline.artifacts import publish_bytes
-from pipeline.artifacts.object_messages import read_objects
-from pipeline.artifacts.scene_messages import read_scenes
 from pipeline.clutter.gaps import bounds_of
-from pipeline.clutter.scene import ClutterScene
 from pipeline.config import StaticCameraConfig, load_run_config
 from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder, run_command
 from pipeline.geometry.catalogue import CatalogueObject
+from pipeline.messages.objects import read_objects
+from pipeline.messages.scenes import read_scenes
 from pipeline.recording.gallery import contact_sheet
-from pipeline.sensing.cameras import PinholeCamera, camera_at
 from pipeline.sensing.rendering import new_renderer, rendered
+from pipeline.world.cameras import PinholeCamera, camera_at
+from pipeline.world.scene import ClutterScene
 from stages.graph import RUNS_DIR
 
 PORTRAIT = StaticCameraConfig(width_px=560, height_px=420, vertical_fov_rad=0.6, sensor="ideal")

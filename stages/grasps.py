@@ -14,19 +14,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact
-from pipeline.artifacts.grasp_messages import (
-    GraspOrigin,
-    LabelledGrasps,
-    ShownPads,
-    grasp_batch,
-    grasps_of,
-    pads_message,
-    pads_of,
-)
-from pipeline.artifacts.object_messages import read_objects
-from pipeline.artifacts.scene_messages import read_placed, read_scene, scene_count
 from pipeline.artifacts.sharding import is_current, shard_entry, shard_path, write_index
-from pipeline.clutter.scene import ClutterScene, PlacedObject
 from pipeline.config import RunConfig
 from pipeline.errors import SceneError
 from pipeline.execution import (
@@ -39,15 +27,13 @@ from pipeline.execution import (
 )
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.mesh import Mesh
-from pipeline.geometry.raycasting import RayScene
-from pipeline.geometry.table import table_mesh
 from pipeline.gripper import GraspStatus, LabelBatch, Pad, build_pad, label_batch
-from pipeline.gripper.balancing import flattened, quality_histogram, rare_grasps
 from pipeline.gripper.draping import drape
-from pipeline.gripper.heights import pad_heights
 from pipeline.gripper.limits import LIMIT_NAMES
 from pipeline.gripper.quality import triangle_pressure
-from pipeline.gripper.sampling import (
+from pipeline.labelling.balancing import flattened, quality_histogram, rare_grasps
+from pipeline.labelling.heights import pad_heights
+from pipeline.labelling.sampling import (
     Candidates,
     Proposal,
     VisibleSurface,
@@ -55,13 +41,27 @@ from pipeline.gripper.sampling import (
     propose,
     propose_nearby,
 )
-from pipeline.recording.cost import Stopwatch, recording_cost
+from pipeline.messages.grasps import (
+    GraspOrigin,
+    LabelledGrasps,
+    ShownPads,
+    grasp_batch,
+    grasps_of,
+    pads_message,
+    pads_of,
+)
+from pipeline.messages.objects import read_objects
+from pipeline.messages.scenes import read_placed, read_scene, scene_count
 from pipeline.recording.grasps import ShownGrasp, blueprint, show_grasps
 from pipeline.recording.recording import recording, spread
-from pipeline.sensing.cameras import PinholeCamera, pixel_rays, shown_whole
 from pipeline.sensing.depth_noise import disturb
 from pipeline.sensing.sub_cloud import merged_sub_clouds
-from pipeline.sensing.view import CameraView
+from pipeline.stopwatch import Stopwatch
+from pipeline.world.cameras import PinholeCamera, pixel_rays, shown_whole
+from pipeline.world.raycasting import RayScene
+from pipeline.world.scene import ClutterScene, PlacedObject
+from pipeline.world.table import table_mesh
+from pipeline.world.view import CameraView
 from schemas.softgrip.v1.grasps_pb2 import DrapedPads, GraspBatch
 from stages.graph import GRASPS, inputs_of
 
@@ -120,7 +120,7 @@ def build(stage: StageContext) -> Summary:
     done = run_in_order(synthesize_shard, jobs, stage.workers, stage.executor)
     results = list(progress(done, count, "grasps", "scene"))
     quality = np.concatenate([result.quality for result in results])
-    recording_cost.seconds += sum(result.recording_s for result in results)
+    stage.drawing.seconds += sum(result.recording_s for result in results)
     record(stage, {index: results[index].shard for index in recorded}, quality)
     entries = [shard_entry(r.shard, stage.output.parent, len(r.quality), r.split) for r in results]
     write_index(stage.output, stage.provenance(), entries, quality_histogram(quality))
@@ -404,7 +404,7 @@ def examined(shard: Path) -> ShardResult:
 def record(stage: StageContext, shards: dict[int, Path], quality: np.ndarray) -> None:
     """The recording: grasps of some scenes by their index, spread over their labels."""
     meshes = {n: item.mesh for n, (item, _) in catalogue(stage.upstream("objects")).items()}
-    with recording(stage.recording, stage.stage.name, stage.key.digest, blueprint()) as stream:
+    with recording(stage, blueprint()) as stream:
         shown: list[ShownGrasp] = []
         for index, shard in shards.items():
             placed = read_placed(stage.upstream("scenes"), index)

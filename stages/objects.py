@@ -10,7 +10,6 @@ from pathlib import Path
 from loguru import logger
 
 from pipeline.artifacts import ArtifactWriter
-from pipeline.artifacts.object_messages import REFUSED_TOPIC, TOPIC, object_message
 from pipeline.config import ObjectsConfig
 from pipeline.errors import ConfigError, MeshError
 from pipeline.execution import (
@@ -32,6 +31,7 @@ from pipeline.geometry.mesh_folders import object_names
 from pipeline.geometry.parametric import PARAMETRIC_OBJECTS, parametric_source
 from pipeline.geometry.selection import choose_split, choose_subset
 from pipeline.geometry.urdf_files import load_object_file, standalone
+from pipeline.messages.objects import REFUSED_TOPIC, TOPIC, object_message
 from pipeline.recording.objects import blueprint, show_catalogue
 from pipeline.recording.recording import recording, spread
 from schemas.softgrip.v1.objects_pb2 import RefusedMesh
@@ -168,7 +168,7 @@ def publish(
     """Write the recording, then the artifact: what is there last makes the stage whole."""
     shown = [objects[i] for i in spread(len(objects), stage.config.recording.objects)]
     opening = blueprint(len(shown), max(item.nsvr for item in shown))
-    with recording(stage.recording, stage.stage.name, stage.key.digest, opening) as stream:
+    with recording(stage, opening) as stream:
         show_catalogue(stream, [(item, split[item.name]) for item in shown])
     with ArtifactWriter(stage.output, stage.provenance()) as artifact:
         for index, item in enumerate(objects):

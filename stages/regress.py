@@ -13,12 +13,12 @@ import numpy as np
 import typer
 
 from pipeline.artifacts import publish_bytes, read_provenance
-from pipeline.artifacts.object_messages import read_objects
-from pipeline.artifacts.scene_messages import read_scenes
 from pipeline.config import load_run_config
 from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder, generator, run_command
-from pipeline.gripper.heights import pad_heights
+from pipeline.labelling.heights import pad_heights
+from pipeline.messages.objects import read_objects
+from pipeline.messages.scenes import read_scenes
 from pipeline.regression.comparison import Figures, compared_count, differences
 from pipeline.regression.figures import figures_of
 from pipeline.regression.pads import write_pads

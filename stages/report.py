@@ -9,11 +9,11 @@ import typer
 from loguru import logger
 
 from pipeline.artifacts import Provenance, open_artifact, package_version, publish_bytes
-from pipeline.artifacts.object_messages import read_objects
 from pipeline.config import RunConfig, load_run_config
 from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder, run_command
 from pipeline.execution.freshness import content_digests
+from pipeline.messages.objects import read_objects
 from pipeline.reporting import plots
 from pipeline.reporting.facts import (
     CatalogueFacts,

@@ -13,12 +13,9 @@ import numpy as np
 import rerun as rr
 
 from pipeline.artifacts import ArtifactWriter, Provenance
-from pipeline.artifacts.object_messages import read_objects
-from pipeline.artifacts.scene_messages import read_scene, write_scene
 from pipeline.artifacts.sharding import is_current
 from pipeline.clutter.building import build_clutter
 from pipeline.clutter.levels import level_of
-from pipeline.clutter.scene import ClutterScene
 from pipeline.config import RunConfig
 from pipeline.errors import SceneError
 from pipeline.execution import (
@@ -32,11 +29,13 @@ from pipeline.execution import (
 )
 from pipeline.execution.busy import BusyClock
 from pipeline.geometry.catalogue import CatalogueObject
-from pipeline.recording.cost import recording_cost
+from pipeline.messages.objects import read_objects
+from pipeline.messages.scenes import read_scene, write_scene
 from pipeline.recording.recording import recording, spread
 from pipeline.recording.scenes import blueprint, show_scene
-from pipeline.sensing.cameras import camera_names, scene_cameras
 from pipeline.sensing.rendering import Renderer, new_renderer, rendered
+from pipeline.world.cameras import camera_names, scene_cameras
+from pipeline.world.scene import ClutterScene
 from stages.graph import SCENES, inputs_of
 
 WAITING_TO_BE_WRITTEN = 4  # rendered scenes, some MB each
@@ -165,6 +164,7 @@ class Publication:
     ) -> None:
         self._artifact = artifact
         self._stream = stream
+        self._drawing = stage.drawing
         items = catalogue(stage.upstream("objects"))
         self._meshes = {name: item.mesh for name, (item, _) in items.items()}
         self._nsvr = {name: item.nsvr for name, (item, _) in items.items()}
@@ -180,9 +180,7 @@ class Publication:
         opening = blueprint(camera_names(stage.config.cameras))
         with (
             ArtifactWriter(stage.output, stage.provenance()) as artifact,
-            recording(
-                stage.recording, stage.stage.name, stage.key.digest, opening, amid_work=True
-            ) as stream,
+            recording(stage, opening, amid_work=True) as stream,
         ):
             yield cls(stage, scenes, artifact, stream)
 
@@ -190,7 +188,7 @@ class Publication:
         """The next scene."""
         index, self._added = self._added, self._added + 1
         if index in self._step_of:
-            with recording_cost.running():
+            with self._drawing.running():
                 show_scene(self._stream, self._step_of[index], scene, self._meshes, self._nsvr)
         write_scene(self._artifact, index, scene, self._renderer)
 

@@ -7,8 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.artifacts import ArtifactWriter, open_artifact
-from pipeline.artifacts.grasp_messages import grasps_of
-from pipeline.artifacts.sample_messages import Samples, joined_samples, sample_batch, samples_of
 from pipeline.artifacts.sharding import (
     is_current,
     listed_shards,
@@ -19,7 +17,9 @@ from pipeline.artifacts.sharding import (
 from pipeline.clutter.levels import level_of
 from pipeline.errors import ArtifactError
 from pipeline.execution import StageContext, Summary, generator, progress, stage_command
-from pipeline.gripper.balancing import first_proposals, quality_histogram
+from pipeline.labelling.balancing import first_proposals, quality_histogram
+from pipeline.messages.grasps import grasps_of
+from pipeline.messages.samples import Samples, joined_samples, sample_batch, samples_of
 from pipeline.recording.recording import recording
 from pipeline.recording.shards import blueprint, show_samples
 from schemas.softgrip.v1.grasps_pb2 import GraspBatch, ShardEntry
@@ -44,7 +44,7 @@ def build(stage: StageContext) -> Summary:
         order = generator(stage.config.seed, "shuffle", split).permutation(len(samples))
         entries += write_split(stage, split, samples.take(order), names)
     every = joined_samples([by_split[split] for split in SPLITS])
-    with recording(stage.recording, stage.stage.name, stage.key.digest, blueprint()) as stream:
+    with recording(stage, blueprint()) as stream:
         show_samples(stream, by_split, stage.config.recording.clouds)
     histogram = quality_histogram(every.quality.astype(np.float64))
     write_index(stage.output, stage.provenance(), entries, histogram)

@@ -29,13 +29,13 @@ import numpy as np
 from google.protobuf.json_format import MessageToDict
 
 from pipeline.artifacts import ArtifactWriter, Provenance
-from pipeline.artifacts.sample_cache import cached_split
-from pipeline.artifacts.sample_messages import Samples
 from pipeline.artifacts.sharding import is_current
-from pipeline.artifacts.sweep_messages import MemberFigures, read_sweep, sweep_message
 from pipeline.config import RunConfig
 from pipeline.config.learning import NetworkConfig, TrainConfig
 from pipeline.execution import StageContext, Summary, progress, run_in_order, stage_command
+from pipeline.messages.sample_cache import cached_split
+from pipeline.messages.samples import Samples
+from pipeline.messages.sweep import MemberFigures, read_sweep, sweep_message
 from pipeline.network.baselines import mean_predictor_mae
 from pipeline.network.family import (
     VARIANTS,
@@ -213,7 +213,7 @@ def publish(
     stage: StageContext, networks: list[SweepNetwork], times_ms: list[float], budget: SweepBudget
 ) -> None:
     """Recording, then artifact."""
-    with recording(stage.recording, stage.stage.name, stage.key.digest, blueprint()) as stream:
+    with recording(stage, blueprint()) as stream:
         show_sweep(stream, networks, times_ms, budget)
     with ArtifactWriter(stage.output, stage.provenance()) as artifact:
         artifact.write(BUDGET, budget, log_time_ns=0)

@@ -13,16 +13,16 @@ from jaxtyping import Float
 from loguru import logger
 
 from pipeline.artifacts import ArtifactWriter, publish_bytes
-from pipeline.artifacts.sample_cache import cached_split
-from pipeline.artifacts.sample_messages import Samples
-from pipeline.artifacts.training_messages import (
+from pipeline.execution import StageContext, Summary, stage_command
+from pipeline.messages.sample_cache import cached_split
+from pipeline.messages.samples import Samples
+from pipeline.messages.training import (
     CHECKPOINT,
     EXPORT,
     TestFigures,
     epoch_message,
     result_message,
 )
-from pipeline.execution import StageContext, Summary, stage_command
 from pipeline.network.baselines import (
     fit_monotone,
     mean_predictor_mae,
@@ -194,7 +194,7 @@ def publish(
     publish_bytes(stage.folder.path / "train" / CHECKPOINT, checkpoint)
     publish_bytes(stage.folder.path / "train" / EXPORT, exported)
     wanted = stage.config.recording.clouds
-    with recording(stage.recording, stage.stage.name, stage.key.digest, blueprint()) as stream:
+    with recording(stage, blueprint()) as stream:
         show_training(stream, trained.history, figures, test_set, wanted)
     with ArtifactWriter(stage.output, stage.provenance()) as artifact:
         for epoch in trained.history:

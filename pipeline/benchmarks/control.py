@@ -5,18 +5,18 @@ import time
 import numpy as np
 
 from pipeline.benchmarks.clock import quantiles_ms
-from pipeline.clutter.scene import ClutterScene
 from pipeline.config import RunConfig
 from pipeline.control.cloud import DepthPicture, merged_cloud
 from pipeline.control.local_phase import LocalPhase
 from pipeline.control.ranking import NetworkRanking
 from pipeline.control.viewpoints import gripper_above
 from pipeline.geometry.mesh import Mesh
-from pipeline.geometry.posed_bodies import PosedBodies
 from pipeline.network.control_inference import ControlPredictor
-from pipeline.sensing.cameras import camera_at
 from pipeline.sensing.depth_by_rays import measured, window_around
 from pipeline.simulation.eyes import gripper_from_camera, moved
+from pipeline.world.cameras import camera_at
+from pipeline.world.posed_bodies import PosedBodies
+from pipeline.world.scene import ClutterScene
 
 
 def step_ms(

@@ -9,15 +9,15 @@ from jaxtyping import Float, Int
 from pipeline.benchmarks.clock import Laps, quantiles_ms
 from pipeline.config.grasps import GripperConfig
 from pipeline.geometry.mesh import Mesh
-from pipeline.geometry.raycasting import RayScene
+from pipeline.gripper.batch import BLOCK, assemble_into, empty_batch, label_batch
 from pipeline.gripper.draping import drape_into
-from pipeline.gripper.heights import pad_heights
-from pipeline.gripper.labelling import BLOCK, assemble_into, empty_batch, label_batch
 from pipeline.gripper.limits import wrench_limit_ratios
 from pipeline.gripper.pad import Pad
 from pipeline.gripper.quality import target_wrench
-from pipeline.gripper.sampling import contact_frames
 from pipeline.gripper.solvers.structured import solve_into
+from pipeline.labelling.heights import pad_heights
+from pipeline.labelling.sampling import contact_frames
+from pipeline.world.raycasting import RayScene
 
 ROUND = 512
 _BUMPS = 8

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.artifacts.sample_cache import cached_split
-from pipeline.artifacts.sample_messages import STORED_AS, Samples
 from pipeline.artifacts.sharding import shard_entry, shard_path, write_index
 from pipeline.benchmarks.clock import seconds_of
 from pipeline.benchmarks.storage import BATCH, FORMATS, PROVENANCE, write_mcap
+from pipeline.messages.sample_cache import cached_split
+from pipeline.messages.samples import STORED_AS, Samples
 from pipeline.network.loading import epoch_batches, load_batches
 from pipeline.network.samples import GraspTensors
 

@@ -13,8 +13,8 @@ import webdataset
 import zarr
 
 from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact
-from pipeline.artifacts.sample_messages import STORED_AS, Samples, sample_batch, samples_of
 from pipeline.benchmarks.clock import seconds_of
+from pipeline.messages.samples import STORED_AS, Samples, sample_batch, samples_of
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 
 BATCH = 256

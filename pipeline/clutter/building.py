@@ -9,12 +9,12 @@ from pipeline.clutter.dropping import drop_again, pile, resting_pose
 from pipeline.clutter.gaps import Surface, nearest_gaps_m, pairwise_gaps_m, penetration_m
 from pipeline.clutter.levels import Distribution, level_of
 from pipeline.clutter.placement import place_isolated, place_multiple
-from pipeline.clutter.scene import ClutterScene, PlacedObject
-from pipeline.clutter.settling import fallen_off, settle
 from pipeline.config.scenes import ScenesConfig
 from pipeline.errors import SceneError
 from pipeline.geometry.catalogue import CatalogueObject
-from pipeline.simulation.engine import add_body, new_world
+from pipeline.physics.engine import add_body, new_world
+from pipeline.physics.settling import fallen_off, settle
+from pipeline.world.scene import ClutterScene, PlacedObject
 
 _DROPS_AGAIN = 25
 _COLOUR = (0.5, 0.5, 0.5)  # physics has no eyes

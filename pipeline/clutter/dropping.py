@@ -6,12 +6,12 @@ import numpy as np
 import sapien
 from jaxtyping import Float
 
-from pipeline.clutter.settling import settle
 from pipeline.config.scenes import ScenesConfig
 from pipeline.errors import SceneError
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.transforms import random_rotation
-from pipeline.simulation.engine import Body, add_body, add_wall, new_world, sapien_pose
+from pipeline.physics.engine import Body, add_body, add_wall, new_world, sapien_pose
+from pipeline.physics.settling import settle
 
 _CLEARANCE_M = 0.005  # above what is below, when let go
 _TRIES_ALONE = 8

@@ -9,7 +9,7 @@ import trimesh
 from jaxtyping import Float
 
 from pipeline.geometry.mesh import Mesh
-from pipeline.geometry.raycasting import RayScene
+from pipeline.world.raycasting import RayScene
 
 NO_NEIGHBOUR_M = np.inf
 

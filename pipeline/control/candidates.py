@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pipeline.control.cloud import Cloud
-from pipeline.gripper.sampling import contact_frames
+from pipeline.labelling.sampling import contact_frames
 
 _FEWEST_POINTS = 6  # a plane through fewer is no surface
 

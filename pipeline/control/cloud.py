@@ -12,7 +12,7 @@ import numba
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from pipeline.sensing.cameras import PinholeCamera
+from pipeline.world.cameras import PinholeCamera
 
 TABLE_CLEARANCE_M = 0.006  # measured points lower than this may be the table
 VOXEL_M = 0.003

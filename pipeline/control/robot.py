@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from pipeline.control.cloud import DepthPicture
-from pipeline.sensing.cameras import PinholeCamera
+from pipeline.world.cameras import PinholeCamera
 
 
 class State(StrEnum):

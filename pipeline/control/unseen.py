@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float, Int
 
 from pipeline.control.cloud import TABLE_CLEARANCE_M, DepthPicture
 from pipeline.geometry.transforms import invert, transform_points
-from pipeline.sensing.cameras import pixel_rays, points_of_depth
+from pipeline.world.cameras import pixel_rays, points_of_depth
 
 TABLE = 0  # instance of the table and of nothing
 _FEWEST_PIXELS = 30  # fewer say too little of an outline

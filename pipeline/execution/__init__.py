@@ -2,10 +2,10 @@
 
 from pipeline.execution.commands import run_command
 from pipeline.execution.executors import run_in_order
-from pipeline.execution.progress import progress
 from pipeline.execution.running import Summary, stage_command
 from pipeline.execution.seeds import derive_seed, generator
 from pipeline.execution.stage import RunFolder, Stage, StageContext
+from pipeline.progress import progress
 
 __all__ = [
     "RunFolder",

@@ -24,7 +24,7 @@ from pipeline.execution.commands import EXIT_FAILURE, words_to
 from pipeline.execution.executors import Executor
 from pipeline.execution.freshness import Key, key_from_json, stage_key
 from pipeline.execution.stage import RunFolder, Stage, StageContext
-from pipeline.recording.cost import LARGEST_MB, processor_time_s, recording_cost
+from pipeline.stopwatch import processor_time_s
 from schemas.softgrip.v1.grasps_pb2 import ShardIndex
 
 Summary = dict[str, Any]
@@ -142,16 +142,12 @@ def run_stage(context: StageContext, build: Build, force: bool) -> None:
     logger.info("{}: started ({} workers)", name, context.workers)
     summary = build(context)
     wall_s, spent_s = time.perf_counter() - started, processor_time_s() - spent_s
-    recorded_mb = context.recording.stat().st_size / 1e6
-    if recorded_mb > LARGEST_MB:
-        advice = "{} has {:.0f} MB, which is slow to open: lower the numbers in [recording]"
-        logger.warning(advice, context.recording, recorded_mb)
     record = {
         "stage": name,
         "key": context.key.digest,
         "wall_time_s": round(wall_s, 3),
-        "recording_share": round(recording_cost.seconds / max(spent_s, CLOCK_TICK_S), 4),
-        "recording_mb": round(recorded_mb, 3),
+        "recording_share": round(context.drawing.seconds / max(spent_s, CLOCK_TICK_S), 4),
+        "recording_mb": round(context.recording.stat().st_size / 1e6, 3),
         **summary,
     }
     publish_bytes(context.folder.summary(name), (json.dumps(record, indent=2) + "\n").encode())

@@ -1,12 +1,13 @@
 """What a stage is, and what it is given when it runs."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from pipeline.artifacts import Input, Provenance, package_version
 from pipeline.config import RunConfig
 from pipeline.execution.executors import Executor
 from pipeline.execution.freshness import Key
+from pipeline.stopwatch import Stopwatch
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,17 @@ class StageContext:
     workers: int
     mesh_dir: Path | None
     executor: Executor = "local"
+    drawing: Stopwatch = field(default_factory=Stopwatch)  # what its recording costs
+
+    @property
+    def name(self) -> str:
+        """The stage's name."""
+        return self.stage.name
+
+    @property
+    def recording_id(self) -> str:
+        """Equal for equal results, so that equal runs open as the same recording."""
+        return self.key.digest
 
     @property
     def output(self) -> Path:

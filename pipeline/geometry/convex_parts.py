@@ -75,7 +75,7 @@ def _run_coacd(
     """CoACD's parts. Its preprocessing rebuilds the surface, at up to six times the cost and
     with thicker walls: needed only where cutting the closed surface itself loses material."""
     # Not at the top: SAPIEN must be loaded before it in a process that renders (see
-    # pipeline/simulation/vulkan.py), and most processes need no CoACD.
+    # pipeline/physics/vulkan.py), and most processes need no CoACD.
     import coacd
 
     coacd.set_log_level("off")

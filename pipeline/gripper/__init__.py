@@ -4,7 +4,7 @@ Pure functions of arrays: what the scene looks like under the pad comes in as a 
 vertex, along z of GCS and from any origin, with a mask of what lies on the target.
 """
 
-from pipeline.gripper.labelling import LabelBatch, label, label_batch
+from pipeline.gripper.batch import LabelBatch, label, label_batch
 from pipeline.gripper.pad import Pad, build_pad
 from pipeline.gripper.problem import GraspStatus, QpSolution, QualityProblem
 from pipeline.gripper.quality import GraspQuality, WeightSummary, label_reference

@@ -6,8 +6,8 @@ from pathlib import Path
 import webdataset
 
 from pipeline.artifacts.publishing import published
-from pipeline.artifacts.sample_messages import Samples
 from pipeline.geometry.shape import ShapeClass
+from pipeline.messages.samples import Samples
 
 CLASSES = tuple(str(kind) for kind in ShapeClass)
 

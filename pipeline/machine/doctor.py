@@ -17,7 +17,7 @@ OLDEST_PYTHON = (3, 11)
 FREE_GIB_WANTED = 5
 RENDER_TRIAL = """
 from pipeline.config import ScenesConfig, StaticCameraConfig
-from pipeline.sensing.cameras import static_cameras
+from pipeline.world.cameras import static_cameras
 from pipeline.sensing.sapien_rendering import rendered_table
 
 seen = rendered_table(ScenesConfig(), static_cameras(StaticCameraConfig())[0])

@@ -1,6 +1,6 @@
 """Samples to batches: who sees which sample when, and how it is read.
 
-Samples lie decoded in memory-mapped arrays (``artifacts.sample_cache``), so a batch of any samples
+Samples lie decoded in memory-mapped arrays (``messages.sample_cache``), so a batch of any samples
 costs a copy of their bytes. An epoch is one permutation of *all* samples, across shards, that
 follows from (seed, epoch) alone; it is cut into batches, and each batch into as many parts as there
 are processes. Which process or loader worker reads a sample therefore changes nothing, a batch's

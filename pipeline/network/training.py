@@ -27,7 +27,6 @@ from torch.nn.parallel import DistributedDataParallel
 
 from pipeline.config.learning import NetworkConfig, TrainConfig
 from pipeline.errors import MachineError
-from pipeline.execution.progress import progress
 from pipeline.network.canonical import CHANNELS, SYMMETRIES, apply_symmetry, network_input
 from pipeline.network.ga_cnn import GaCnn, build_network
 from pipeline.network.loading import (
@@ -47,6 +46,7 @@ from pipeline.network.resuming import (
     save_standing,
 )
 from pipeline.network.samples import GraspTensors
+from pipeline.progress import progress
 
 # Rises whenever the loop changes what it computes: a state of another version is not continued.
 STATE_VERSION = 2

@@ -12,15 +12,15 @@ import rerun as rr
 import rerun.blueprint as rrb
 from jaxtyping import Float
 
-from pipeline.artifacts.grasp_messages import GraspOrigin, LabelledGrasps
-from pipeline.clutter.scene import PlacedObject
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.transforms import invert
-from pipeline.gripper.balancing import quality_histogram
 from pipeline.gripper.pad import Pad
+from pipeline.labelling.balancing import quality_histogram
+from pipeline.messages.grasps import GraspOrigin, LabelledGrasps
 from pipeline.recording import colours
 from pipeline.recording.recording import looking, name_curve, numbered, step, time_panel
 from pipeline.recording.shapes import shown_mesh, shown_pose
+from pipeline.world.scene import PlacedObject
 
 TIMELINE = "grasp"
 FULL_PRESSURE = 1.1  # p w_j of a full seal where w_j is greatest, with sigma_W of Eq. (13)

@@ -12,7 +12,7 @@ Entity paths and the timeline are named alike across stages, and a test holds ev
   `TIMELINES`. A view on another timeline would open empty.
 
 How many things a recording shows is bounded by ``[recording]`` of run.toml, so that it stays
-under `LARGEST_MB` of ``cost``; what it costs is ``recording_share`` of the stage's summary.
+under `LARGEST_MB`; what it costs is ``recording_share`` of the stage's summary.
 """
 
 import errno
@@ -22,18 +22,21 @@ from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from functools import partial
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 import pyarrow.compute  # noqa: F401 - Rerun loads it at the first bar chart, amid the logging
 import rerun as rr
 import rerun.blueprint as rrb
 from jaxtyping import UInt8
+from loguru import logger
 
 from pipeline.artifacts.publishing import published
-from pipeline.recording.cost import recording_cost
+from pipeline.stopwatch import Stopwatch
 
 APPLICATION = "softgrip"
 NO_ROOM_BYTES = 1 << 20
+LARGEST_MB = 200  # what a viewer still opens in seconds; [recording] of run.toml keeps below it
 ROOTS = ("world", "camera", "curves", "notes")
 TIMELINES = {
     "objects": "object",
@@ -46,21 +49,50 @@ TIMELINES = {
 }
 
 
+class Recorded(Protocol):
+    """What a recording is told about the stage that it shows."""
+
+    @property
+    def name(self) -> str:
+        """The stage's name."""
+
+    @property
+    def recording(self) -> Path:
+        """Where the recording appears."""
+
+    @property
+    def recording_id(self) -> str:
+        """The stage's key, so that equal runs open as the same recording."""
+
+    @property
+    def drawing(self) -> Stopwatch:
+        """Counts the processor time that recording takes."""
+
+
 @contextmanager
 def recording(
-    path: Path, stage: str, recording_id: str, blueprint: rrb.Blueprint, amid_work: bool = False
+    stage: Recorded, blueprint: rrb.Blueprint, amid_work: bool = False
 ) -> Iterator[rr.RecordingStream]:
-    """Open the recording of a stage; it appears at ``path`` when the block ends well.
+    """Open the recording of a stage; it appears at ``stage.recording`` when the block ends well.
 
-    recording_id : the stage's key, so that equal runs open as the same recording.
+    Parameters
+    ----------
+    stage : its name, the recording's place and identity, and the stopwatch to run.
+    blueprint : how the viewer lays the recording out.
     amid_work : the block holds the stage's work too, and what it logs runs under
-        `recording_cost` itself; else the whole block counts as recording.
+        ``stage.drawing`` itself; else the whole block counts as recording.
+
+    Raises
+    ------
+    OSError : the disk is full.
     """
-    held = partial(recording_cost.running, whole_process=not amid_work)
+    path = stage.recording
+    held = partial(stage.drawing.running, whole_process=not amid_work)
     with published(path) as scratch:
         with held():
             _check_room(scratch)
-            stream = rr.RecordingStream(f"{APPLICATION}_{stage}", recording_id=recording_id)
+            name = f"{APPLICATION}_{stage.name}"
+            stream = rr.RecordingStream(name, recording_id=stage.recording_id)
             stream.save(scratch, default_blueprint=blueprint)
         try:
             with nullcontext() if amid_work else held():
@@ -69,6 +101,15 @@ def recording(
             with held(), _disk_full_told(scratch):
                 stream.flush()
                 stream.disconnect()
+    _warn_if_large(path)
+
+
+def _warn_if_large(path: Path) -> None:
+    """A recording over `LARGEST_MB` is slow to open."""
+    megabytes = path.stat().st_size / 1e6
+    if megabytes > LARGEST_MB:
+        advice = "{} has {:.0f} MB, which is slow to open: lower the numbers in [recording]"
+        logger.warning(advice, path, megabytes)
 
 
 @contextmanager

@@ -7,13 +7,13 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from pipeline.clutter.levels import level_of
-from pipeline.clutter.scene import ClutterScene
 from pipeline.geometry.mesh import Mesh
 from pipeline.recording import colours
 from pipeline.recording.recording import looking, numbered, step, time_panel
 from pipeline.recording.shapes import shown_mesh, shown_pose
-from pipeline.sensing.cameras import points_of_depth
-from pipeline.sensing.view import CameraView
+from pipeline.world.cameras import points_of_depth
+from pipeline.world.scene import ClutterScene
+from pipeline.world.view import CameraView
 
 TIMELINE = "scene"
 FRUSTUM_M = 0.15

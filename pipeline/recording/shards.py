@@ -4,8 +4,8 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pipeline.artifacts.sample_messages import Samples
-from pipeline.gripper.balancing import quality_histogram
+from pipeline.labelling.balancing import quality_histogram
+from pipeline.messages.samples import Samples
 from pipeline.recording import colours
 from pipeline.recording.recording import looking, spread, time_panel
 

@@ -6,8 +6,8 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pipeline.artifacts.sample_messages import Samples
-from pipeline.artifacts.training_messages import TestFigures
+from pipeline.messages.samples import Samples
+from pipeline.messages.training import TestFigures
 from pipeline.network.resuming import EpochMetrics
 from pipeline.recording import colours
 from pipeline.recording.recording import looking, name_curve, step, time_panel

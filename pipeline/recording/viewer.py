@@ -14,7 +14,7 @@ from rerun.experimental import ViewerClient
 
 from pipeline.artifacts import publish_bytes
 from pipeline.errors import MachineError, SoftgripError
-from pipeline.simulation.vulkan import choose_vulkan_driver
+from pipeline.physics.vulkan import choose_vulkan_driver
 
 _PATIENCE_S = 60.0
 _PAUSE_S = 0.5

@@ -4,13 +4,13 @@ import json
 from pathlib import Path
 
 from pipeline.artifacts import from_tensor, open_artifact
-from pipeline.artifacts.object_messages import read_objects
-from pipeline.artifacts.scene_messages import read_scenes
 from pipeline.artifacts.sharding import read_index
 from pipeline.clutter.levels import Distribution, level_of
 from pipeline.config import load_run_config
 from pipeline.execution import RunFolder
 from pipeline.gripper import GraspStatus
+from pipeline.messages.objects import read_objects
+from pipeline.messages.scenes import read_scenes
 from pipeline.regression.comparison import Figures, Value
 from pipeline.regression.pads import labelled_pads
 from schemas.softgrip.v1.training_pb2 import TrainingResult

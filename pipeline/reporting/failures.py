@@ -10,12 +10,12 @@ from jaxtyping import Float
 from PIL import Image
 
 from pipeline.artifacts.tensors import from_tensor
-from pipeline.clutter.scene import PlacedObject
 from pipeline.config import ScenesConfig, StaticCameraConfig
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.mesh import Mesh
-from pipeline.sensing.cameras import camera_at
 from pipeline.sensing.ray_rendering import RayRenderer
+from pipeline.world.cameras import camera_at
+from pipeline.world.scene import PlacedObject
 from schemas.softgrip.v1.evaluation_pb2 import Attempt
 
 CAMERA = StaticCameraConfig(width_px=400, height_px=300, vertical_fov_rad=0.7, sensor="ideal")

@@ -10,11 +10,11 @@ import numba
 import numpy as np
 from jaxtyping import Float, Int
 
-from pipeline.geometry.posed_bodies import PosedScene
 from pipeline.geometry.transforms import invert, transform_points
-from pipeline.sensing.cameras import PinholeCamera
 from pipeline.sensing.depth_noise import disturb
-from pipeline.sensing.view import CameraView, normal_map
+from pipeline.world.cameras import PinholeCamera
+from pipeline.world.posed_bodies import PosedScene
+from pipeline.world.view import CameraView, normal_map
 
 
 def measured(

@@ -17,7 +17,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from pipeline.config.cameras import DepthSensor
-from pipeline.sensing.view import CameraView
+from pipeline.world.view import CameraView
 
 
 @dataclass(frozen=True)

@@ -5,16 +5,16 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from jaxtyping import Float
 
-from pipeline.clutter.scene import PlacedObject
 from pipeline.config.scenes import ScenesConfig
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.mesh import Mesh
-from pipeline.geometry.raycasting import RayHits, RayScene
-from pipeline.geometry.table import table_mesh
 from pipeline.geometry.transforms import invert, rotate_vectors
-from pipeline.sensing.cameras import PinholeCamera, pixel_rays
-from pipeline.sensing.view import CameraView, normal_map
-from pipeline.simulation.appearance import body_colour, crease_normals
+from pipeline.physics.appearance import body_colour, crease_normals
+from pipeline.world.cameras import PinholeCamera, pixel_rays
+from pipeline.world.raycasting import RayHits, RayScene
+from pipeline.world.scene import PlacedObject
+from pipeline.world.table import table_mesh
+from pipeline.world.view import CameraView, normal_map
 
 _TABLE_COLOUR = (0.5, 0.5, 0.48)
 _LIGHT = np.array([-0.32, -0.39, 0.86])  # towards the light

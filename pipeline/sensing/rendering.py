@@ -13,15 +13,15 @@ import numpy as np
 from jaxtyping import UInt8
 from loguru import logger
 
-from pipeline.clutter.scene import ClutterScene, PlacedObject
 from pipeline.config.cameras import RendererName
 from pipeline.config.scenes import ScenesConfig
 from pipeline.errors import MachineError
 from pipeline.geometry.catalogue import CatalogueObject
-from pipeline.sensing.cameras import PinholeCamera
 from pipeline.sensing.ray_rendering import RayRenderer
 from pipeline.sensing.sapien_rendering import SapienRenderer
-from pipeline.sensing.view import CameraView
+from pipeline.world.cameras import PinholeCamera
+from pipeline.world.scene import ClutterScene, PlacedObject
+from pipeline.world.view import CameraView
 
 # What of a transparent object's own colour is seen, the rest being what lies behind it.
 _TINT = 0.25

@@ -6,13 +6,13 @@ import numpy as np
 import sapien
 from jaxtyping import UInt16
 
-from pipeline.clutter.scene import PlacedObject
 from pipeline.config.scenes import ScenesConfig
 from pipeline.geometry.catalogue import CatalogueObject
-from pipeline.sensing.cameras import PinholeCamera
-from pipeline.sensing.view import CameraView, normal_map
-from pipeline.simulation.appearance import body_colour, mesh_visual
-from pipeline.simulation.engine import body_id_of, body_name, new_world, sapien_pose
+from pipeline.physics.appearance import body_colour, mesh_visual
+from pipeline.physics.engine import body_id_of, body_name, new_world, sapien_pose
+from pipeline.world.cameras import PinholeCamera
+from pipeline.world.scene import PlacedObject
+from pipeline.world.view import CameraView, normal_map
 
 _NEAR_M, _FAR_M = 0.05, 10.0
 # SAPIEN's camera looks along +x with y left and z up; CCS looks along +z with x right, y down.

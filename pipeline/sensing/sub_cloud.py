@@ -18,7 +18,7 @@ from jaxtyping import Bool, Float
 
 from pipeline.config.grasps import SensingConfig
 from pipeline.geometry.transforms import invert
-from pipeline.sensing.cameras import PinholeCamera
+from pipeline.world.cameras import PinholeCamera
 
 
 def sub_clouds(

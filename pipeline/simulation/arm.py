@@ -19,8 +19,8 @@ from pipeline.errors import SoftgripError
 from pipeline.geometry.compiled_poses import pose_of
 from pipeline.geometry.iiwa14 import AXES, LIMITS_RAD
 from pipeline.geometry.transforms import invert
+from pipeline.physics.engine import sapien_pose
 from pipeline.simulation.arm_clearance import ArmClearance
-from pipeline.simulation.engine import sapien_pose
 from pipeline.simulation.iiwa14 import GRIPPER_LINK, urdf
 
 _STIFFNESS, _DAMPING = 4e4, 4e3  # of the joints' position drives [N m/rad, N m s/rad]

@@ -10,11 +10,11 @@ from pipeline.config import RunConfig
 from pipeline.config.evaluation import HandConfig
 from pipeline.control.cloud import DepthPicture
 from pipeline.geometry.catalogue import CatalogueObject
-from pipeline.geometry.posed_bodies import PosedBodies
 from pipeline.geometry.transforms import look_at
-from pipeline.sensing.cameras import PinholeCamera, camera_at, static_cameras
+from pipeline.physics.engine import Body
 from pipeline.sensing.depth_by_rays import measured, window_around
-from pipeline.simulation.engine import Body
+from pipeline.world.cameras import PinholeCamera, camera_at, static_cameras
+from pipeline.world.posed_bodies import PosedBodies
 
 _ORIGIN = np.zeros(3)
 

@@ -15,14 +15,14 @@ from pipeline.config import RunConfig
 from pipeline.control.robot import Reading, State
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.compiled_poses import turn_between, turned
-from pipeline.geometry.posed_bodies import PosedBodies, PosedScene
 from pipeline.gripper import label_batch
-from pipeline.gripper.heights import pad_heights
 from pipeline.gripper.pad import Pad
-from pipeline.simulation.engine import Body
+from pipeline.labelling.heights import pad_heights
+from pipeline.physics.engine import Body
 from pipeline.simulation.floating import Mover
 from pipeline.simulation.suction import Holding, holding
 from pipeline.simulation.suction_joint import SuctionJoint
+from pipeline.world.posed_bodies import PosedBodies, PosedScene
 
 _TOUCH_N = 2.0  # what the pad's spring pushes with when it touches
 _ARRIVED_M, _ARRIVED_RAD = 1e-4, 1e-3

@@ -7,7 +7,6 @@ import numpy as np
 import sapien
 from jaxtyping import Float
 
-from pipeline.clutter.scene import ClutterScene
 from pipeline.config import RunConfig
 from pipeline.config.evaluation import PolicyName
 from pipeline.control.decision import Cause, Decision, Strategy
@@ -15,11 +14,12 @@ from pipeline.control.policy import Attempt
 from pipeline.control.ranking import NetworkRanking, Predict, flattest_at_the_top
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.gripper.pad import build_pad
+from pipeline.physics.engine import Body, add_body, new_world
 from pipeline.simulation.arm import ArmMover
-from pipeline.simulation.engine import Body, add_body, new_world
 from pipeline.simulation.eyes import SimulatedEyes
 from pipeline.simulation.floating import FloatingMover, Mover
 from pipeline.simulation.gripper_body import Sample, SuctionGripper
+from pipeline.world.scene import ClutterScene
 
 _COLOUR = (0.5, 0.5, 0.5)
 _GONE_M = -0.05  # an object whose centre is lower than this has left the table

@@ -12,11 +12,11 @@ import numpy as np
 import trimesh
 from jaxtyping import Float
 
-from pipeline.clutter.scene import ClutterScene, PlacedObject
 from pipeline.config import RunConfig
 from pipeline.geometry.catalogue import CatalogueObject, Material
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.shape import solid_properties
+from pipeline.world.scene import ClutterScene, PlacedObject
 
 _DENSITY_KG_M3 = 300.0
 _FACE_M = 0.006

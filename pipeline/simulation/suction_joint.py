@@ -12,7 +12,7 @@ from jaxtyping import Float
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.compiled_poses import pose_of, turn_between
 from pipeline.geometry.transforms import invert
-from pipeline.simulation.engine import Body, roll_freely
+from pipeline.physics.engine import Body, roll_freely
 from pipeline.simulation.suction import Holding, breaks
 
 _RATE_1_S = 40.0  # natural frequency; critically damped

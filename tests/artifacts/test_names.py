@@ -7,10 +7,10 @@ import pytest
 
 from pipeline.artifacts import ArtifactWriter, Provenance, to_tensor
 from pipeline.artifacts.names import file_name
-from pipeline.artifacts.object_messages import read_objects
-from pipeline.artifacts.scene_messages import read_scene
 from pipeline.errors import ArtifactError
 from pipeline.geometry.parametric import PARAMETRIC_OBJECTS
+from pipeline.messages.objects import read_objects
+from pipeline.messages.scenes import read_scene
 from schemas.softgrip.v1.objects_pb2 import CatalogueObject
 from schemas.softgrip.v1.scenes_pb2 import Scene
 

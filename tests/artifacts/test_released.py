@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from pipeline.artifacts import from_tensor, open_artifact
-from pipeline.artifacts.grasp_messages import grasps_of
 from pipeline.artifacts.inspection import verified
-from pipeline.artifacts.object_messages import read_objects
-from pipeline.artifacts.sample_messages import samples_of
-from pipeline.artifacts.scene_messages import read_scenes
 from pipeline.artifacts.sharding import listed_shards, read_index
-from pipeline.artifacts.training_messages import CHECKPOINT, EXPORT
+from pipeline.messages.grasps import grasps_of
+from pipeline.messages.objects import read_objects
+from pipeline.messages.samples import samples_of
+from pipeline.messages.scenes import read_scenes
+from pipeline.messages.training import CHECKPOINT, EXPORT
 from pipeline.network.checkpoint import load_checkpoint_bytes
 from pipeline.network.control_inference import ControlPredictor, checked_against
 from pipeline.network.inference import predict

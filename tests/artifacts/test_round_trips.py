@@ -17,16 +17,16 @@ from hypothesis.extra import numpy as hnp
 from scipy.spatial.transform import Rotation
 
 from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact, to_tensor
-from pipeline.artifacts.object_messages import object_message, object_of, read_objects
-from pipeline.artifacts.sample_messages import STORED_AS, Samples, sample_batch, samples_of
-from pipeline.artifacts.scene_messages import read_scene, write_scene
 from pipeline.artifacts.tensors import DTYPES
-from pipeline.clutter.scene import ClutterScene, PlacedObject
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.shape import ShapeClass
-from pipeline.sensing.cameras import PinholeCamera
-from pipeline.sensing.view import CameraView
+from pipeline.messages.objects import object_message, object_of, read_objects
+from pipeline.messages.samples import STORED_AS, Samples, sample_batch, samples_of
+from pipeline.messages.scenes import read_scene, write_scene
+from pipeline.world.cameras import PinholeCamera
+from pipeline.world.scene import ClutterScene, PlacedObject
+from pipeline.world.view import CameraView
 from schemas.compatibility import ROOT, versions
 from schemas.softgrip.v1 import objects_pb2, samples_pb2
 

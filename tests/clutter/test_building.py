@@ -9,12 +9,12 @@ from scipy.spatial import cKDTree
 
 from pipeline.clutter.building import build_clutter
 from pipeline.clutter.levels import Distribution, level_of
-from pipeline.clutter.scene import ClutterScene
 from pipeline.config import ConvexPartsConfig, ObjectsConfig, ScenesConfig
 from pipeline.errors import SceneError
 from pipeline.geometry.catalogue import CatalogueObject, finish_object, measure_object
 from pipeline.geometry.parametric import PARAMETRIC_OBJECTS, parametric_source
 from pipeline.geometry.shape import ShapeClass
+from pipeline.world.scene import ClutterScene
 from tests.bodies import catalogue_object
 
 CONFIG = ScenesConfig(objects_per_clutter=4)

@@ -9,7 +9,7 @@ from pipeline.control.cloud import DepthPicture
 from pipeline.control.robot import Reading, State
 from pipeline.control.viewpoints import gripper_above
 from pipeline.geometry.transforms import invert, look_at, transform_points
-from pipeline.sensing.cameras import PinholeCamera, camera_at
+from pipeline.world.cameras import PinholeCamera, camera_at
 
 _CAMERA = replace(camera_at("fake", WristCameraConfig(), np.zeros(3), 1.0, 0.0, 0.0), near_m=0.0)
 

@@ -7,7 +7,7 @@ from pipeline.control.candidates import Candidates, candidates_at, sample_near
 from pipeline.control.clearance import free_of_collision
 from pipeline.control.cloud import Cloud, merged_cloud
 from pipeline.control.ranking import flattest_at_the_top, smoothed
-from pipeline.gripper.sampling import contact_frames
+from pipeline.labelling.sampling import contact_frames
 from tests.control.fakes import picture_of
 from tests.control.test_policy import plate
 

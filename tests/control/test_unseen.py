@@ -13,7 +13,7 @@ from pipeline.control.decision import Cause, Strategy
 from pipeline.control.policy import Attempt
 from pipeline.control.unseen import hull_top, unseen_contacts, unseen_instances
 from pipeline.geometry.transforms import look_at
-from pipeline.sensing.cameras import PinholeCamera, points_of_depth
+from pipeline.world.cameras import PinholeCamera, points_of_depth
 from tests.control.fakes import FakeEyes, FakeRobot
 
 SIDE_M, TOP_M = 0.06, 0.05

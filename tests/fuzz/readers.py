@@ -19,15 +19,15 @@ from mcap_protobuf.schema import register_schema
 
 from pipeline.artifacts import ArtifactWriter, Provenance, from_tensor, open_artifact, to_tensor
 from pipeline.artifacts.bounds import FOOTER, MAGIC
-from pipeline.artifacts.grasp_messages import GraspOrigin, LabelledGrasps, grasp_batch, grasps_of
 from pipeline.artifacts.inspection import contents_of, verified
-from pipeline.artifacts.object_messages import object_of
-from pipeline.artifacts.sample_messages import Samples, sample_batch, samples_of
-from pipeline.artifacts.training_messages import CHECKPOINT, EXPORT
 from pipeline.config import ObjectsConfig, load_run_config
 from pipeline.errors import SoftgripError
 from pipeline.geometry.mesh_files import load_mesh_file
 from pipeline.geometry.mesh_folders import MESH_SUFFIXES
+from pipeline.messages.grasps import GraspOrigin, LabelledGrasps, grasp_batch, grasps_of
+from pipeline.messages.objects import object_of
+from pipeline.messages.samples import Samples, sample_batch, samples_of
+from pipeline.messages.training import CHECKPOINT, EXPORT
 from pipeline.network.checkpoint import _digest, load_checkpoint_bytes
 from pipeline.network.control_inference import ControlPredictor
 from schemas.softgrip.v1.grasps_pb2 import GraspBatch, ShardIndex

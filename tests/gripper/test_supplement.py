@@ -7,7 +7,13 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 SOURCES = "\n".join(
     path.read_text()
-    for folder in ("pipeline/gripper", "pipeline/sensing", "pipeline/config")
+    for folder in (
+        "pipeline/gripper",
+        "pipeline/labelling",
+        "pipeline/sensing",
+        "pipeline/world",
+        "pipeline/config",
+    )
     for path in sorted((ROOT / folder).rglob("*.py"))
 ) + "\n".join((ROOT / "stages" / name).read_text() for name in ("grasps.py",))
 

@@ -10,8 +10,8 @@ import onnx
 from onnx import TensorProto, helper, numpy_helper
 
 from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact
-from pipeline.artifacts.training_messages import CHECKPOINT, EXPORT
 from pipeline.config.learning import NetworkConfig
+from pipeline.messages.training import CHECKPOINT, EXPORT
 from pipeline.network.canonical import CHANNELS
 from pipeline.network.checkpoint import FORMAT, _digest, load_checkpoint_bytes
 from pipeline.network.control_inference import ControlPredictor

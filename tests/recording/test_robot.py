@@ -1,6 +1,7 @@
 """The film of an attempt: the pad everywhere, an arm's links where an arm was moving."""
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,9 @@ from pipeline.artifacts.tensors import to_tensor
 from pipeline.config import RunConfig
 from pipeline.geometry.iiwa14 import LIMITS_RAD, LINKS
 from pipeline.recording.evaluate import blueprint, show_attempts
-from pipeline.recording.recording import recording
+from pipeline.recording.recording import Recorded, recording
 from pipeline.simulation.iiwa14 import flange_from_gripper
+from pipeline.stopwatch import Stopwatch
 from schemas.softgrip.v1.evaluation_pb2 import Attempt
 from stages.evaluate import shown_robot
 from tests.simulation.kinematics import flange_pose
@@ -45,10 +47,17 @@ def attempt(seed: int, with_arm: bool) -> Attempt:
     return made
 
 
+def stage_at(path: Path) -> Recorded:
+    """A stage whose recording appears at ``path``."""
+    return SimpleNamespace(
+        name="evaluate", recording=path, recording_id="test", drawing=Stopwatch()
+    )
+
+
 def filmed(folder: Path, attempts: list[Attempt]) -> dict[str, Rows]:
     """Entity → rows of its columns, of a film of the attempts."""
     path = folder / "evaluate.rrd"
-    with recording(path, "evaluate", "test", blueprint()) as stream:
+    with recording(stage_at(path), blueprint()) as stream:
         show_attempts(stream, attempts, {"s": []}, {}, "", ROBOT)
     rows: dict[str, Rows] = {}
     for chunk in RrdReader(path).stream():
@@ -102,7 +111,7 @@ def test_the_pad_is_shown_at_its_size(tmp_path: Path) -> None:
             "evaluate": {"hand": {"stem_radius_m": 0.036}},
         }
     )
-    with recording(path, "evaluate", "test", blueprint()) as stream:
+    with recording(stage_at(path), blueprint()) as stream:
         show_attempts(stream, [], {}, {}, "", shown_robot(wide))
     shown = [
         row["Cylinders3D:radii"]

@@ -7,9 +7,9 @@ import trimesh
 
 from pipeline.config.cameras import WristCameraConfig
 from pipeline.geometry.mesh import Mesh
-from pipeline.geometry.posed_bodies import PosedBodies, PosedScene
-from pipeline.sensing.cameras import PinholeCamera, camera_at
 from pipeline.sensing.depth_by_rays import measured, window_around
+from pipeline.world.cameras import PinholeCamera, camera_at
+from pipeline.world.posed_bodies import PosedBodies, PosedScene
 
 
 def box_on_table() -> PosedScene:

@@ -10,7 +10,6 @@ import pytest
 import trimesh
 from scipy import ndimage
 
-from pipeline.clutter.scene import ClutterScene, PlacedObject
 from pipeline.config import (
     CamerasConfig,
     DepthSensor,
@@ -26,7 +25,12 @@ from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.mesh_files import MeshSource
 from pipeline.geometry.shape import nsvr, shape_class
 from pipeline.geometry.transforms import invert, transform_points
-from pipeline.sensing.cameras import (
+from pipeline.sensing.depth_noise import NOISE_MODELS, cosine_of_incidence, disturb
+from pipeline.sensing.ray_rendering import RayRenderer
+from pipeline.sensing.rendering import Renderer, new_renderer, rendered
+from pipeline.sensing.sapien_rendering import SapienRenderer
+from pipeline.sensing.sub_cloud import merged_sub_clouds, sub_clouds
+from pipeline.world.cameras import (
     camera_names,
     points_of_depth,
     scene_cameras,
@@ -34,12 +38,8 @@ from pipeline.sensing.cameras import (
     static_cameras,
     wrist_cameras,
 )
-from pipeline.sensing.depth_noise import NOISE_MODELS, cosine_of_incidence, disturb
-from pipeline.sensing.ray_rendering import RayRenderer
-from pipeline.sensing.rendering import Renderer, new_renderer, rendered
-from pipeline.sensing.sapien_rendering import SapienRenderer
-from pipeline.sensing.sub_cloud import merged_sub_clouds, sub_clouds
-from pipeline.sensing.view import CameraView, normals_of
+from pipeline.world.scene import ClutterScene, PlacedObject
+from pipeline.world.view import CameraView, normals_of
 
 CAMERAS = static_cameras(StaticCameraConfig())
 
@@ -405,7 +405,7 @@ def test_pictures_are_lit_where_convex_parts_are_computed_too() -> None:
         "import coacd\n"
         "from pipeline.config import ScenesConfig, StaticCameraConfig\n"
         "from pipeline.errors import MachineError\n"
-        "from pipeline.sensing.cameras import static_cameras\n"
+        "from pipeline.world.cameras import static_cameras\n"
         "from pipeline.sensing.sapien_rendering import rendered_table\n"
         "try:\n"
         "    rendered_table(ScenesConfig(), static_cameras(StaticCameraConfig())[0])\n"

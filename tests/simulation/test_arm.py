@@ -8,8 +8,8 @@ from pipeline.config.scenes import ScenesConfig
 from pipeline.control.viewpoints import gripper_above
 from pipeline.geometry.iiwa14 import AXES, LIMITS_RAD, LINKS, link_poses
 from pipeline.geometry.transforms import invert
+from pipeline.physics.engine import new_world, sapien_pose
 from pipeline.simulation.arm import ArmMover
-from pipeline.simulation.engine import new_world, sapien_pose
 from pipeline.simulation.iiwa14 import flange_from_gripper
 from tests.simulation.kinematics import flange_pose
 

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 from pipeline.config.evaluation import ArmConfig, HandConfig
 from pipeline.config.scenes import ScenesConfig
 from pipeline.geometry.iiwa14 import LIMITS_RAD, LINKS, LinkShape, link_poses
+from pipeline.physics.engine import new_world
 from pipeline.simulation.arm import ArmMover
 from pipeline.simulation.arm_clearance import TABLE, ArmClearance
-from pipeline.simulation.engine import new_world
 from pipeline.simulation.iiwa14 import flange_from_gripper, stem_shape
 from tests.simulation.kinematics import flange_pose
 

@@ -17,7 +17,7 @@ from pipeline.config.evaluation import (
 from pipeline.control.robot import Reading
 from pipeline.control.wrench_monitor import hanging_n
 from pipeline.gripper.pad import build_pad
-from pipeline.simulation.engine import add_body, new_world
+from pipeline.physics.engine import add_body, new_world
 from pipeline.simulation.gripper_body import SuctionGripper
 from pipeline.simulation.iiwa14 import flange_from_gripper
 from pipeline.simulation.picking import mover_of

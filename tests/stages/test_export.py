@@ -11,12 +11,12 @@ import pytest
 import trimesh
 import webdataset
 
-from pipeline.artifacts.object_messages import read_objects
-from pipeline.artifacts.sample_messages import Samples
 from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder
 from pipeline.interchange.object_grasps import ObjectGrasps
 from pipeline.interchange.tar_shards import CLASSES
+from pipeline.messages.objects import read_objects
+from pipeline.messages.samples import Samples
 from stages.export import SPLITS, Format, export_run, grasps_by_object
 from stages.shards import read_split
 

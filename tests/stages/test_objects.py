@@ -5,11 +5,11 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from pipeline.artifacts.object_messages import read_objects
 from pipeline.errors import MeshError
 from pipeline.execution import RunFolder, StageContext
 from pipeline.execution.running import stage_context
 from pipeline.geometry.parametric import PARAMETRIC_OBJECTS
+from pipeline.messages.objects import read_objects
 from stages import objects
 from stages.graph import OBJECTS, inputs_of
 

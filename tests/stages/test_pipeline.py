@@ -8,9 +8,9 @@ import numpy as np
 
 from pipeline.artifacts import open_artifact, read_provenance
 from pipeline.artifacts.inspection import verified
-from pipeline.artifacts.object_messages import read_objects
-from pipeline.artifacts.scene_messages import read_scenes
 from pipeline.execution import RunFolder
+from pipeline.messages.objects import read_objects
+from pipeline.messages.scenes import read_scenes
 from schemas.softgrip.v1.evaluation_pb2 import Attempt, Comparison, LevelResult
 from schemas.softgrip.v1.training_pb2 import TrainingResult
 from stages.graph import STAGES

@@ -8,10 +8,10 @@ import pytest
 from rerun.chunk import RrdReader
 
 from pipeline.artifacts import open_artifact
-from pipeline.artifacts.grasp_messages import grasps_of
-from pipeline.artifacts.scene_messages import read_scenes
 from pipeline.artifacts.tensors import from_tensor
 from pipeline.execution import RunFolder
+from pipeline.messages.grasps import grasps_of
+from pipeline.messages.scenes import read_scenes
 from schemas.softgrip.v1.grasps_pb2 import GraspBatch, ShardIndex
 from schemas.softgrip.v1.training_pb2 import Epoch
 

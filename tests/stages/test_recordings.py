@@ -13,8 +13,7 @@ from rerun.chunk import RrdReader
 
 from pipeline.errors import MachineError
 from pipeline.execution import RunFolder
-from pipeline.recording.cost import LARGEST_MB
-from pipeline.recording.recording import ROOTS, TIMELINES
+from pipeline.recording.recording import LARGEST_MB, ROOTS, TIMELINES
 from pipeline.recording.viewer import Sight, sight_of
 from stages.graph import STAGES
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from pipeline.artifacts import open_artifact
-from pipeline.artifacts.sweep_messages import read_sweep
 from pipeline.execution import RunFolder
+from pipeline.messages.sweep import read_sweep
 from schemas.softgrip.v1.training_pb2 import SweepBudget
 from tests.stages.conftest import run_stage
 from tests.stages.test_recordings import drawn_share, seen_or_skipped

@@ -7,16 +7,6 @@ import numpy as np
 import pytest
 
 from pipeline.artifacts import ArtifactWriter, Provenance
-from pipeline.artifacts.grasp_messages import (
-    GraspOrigin,
-    LabelledGrasps,
-    ShownPads,
-    grasp_batch,
-    grasps_of,
-    pads_message,
-    pads_of,
-)
-from pipeline.artifacts.sample_messages import Samples, joined_samples, sample_batch, samples_of
 from pipeline.artifacts.sharding import (
     is_current,
     listed_shards,
@@ -26,6 +16,16 @@ from pipeline.artifacts.sharding import (
     write_index,
 )
 from pipeline.errors import ArtifactError
+from pipeline.messages.grasps import (
+    GraspOrigin,
+    LabelledGrasps,
+    ShownPads,
+    grasp_batch,
+    grasps_of,
+    pads_message,
+    pads_of,
+)
+from pipeline.messages.samples import Samples, joined_samples, sample_batch, samples_of
 from schemas.softgrip.v1.grasps_pb2 import DrapedPads, GraspBatch, ShardEntry
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 

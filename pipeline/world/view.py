@@ -6,7 +6,7 @@ import numba
 import numpy as np
 from jaxtyping import Float, UInt8, UInt16
 
-from pipeline.sensing.cameras import PinholeCamera
+from pipeline.world.cameras import PinholeCamera
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,8 +15,8 @@ from pipeline.config.scenes import ScenesConfig
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.transforms import pose_from, position_quaternion
-from pipeline.simulation import appearance
-from pipeline.simulation.vulkan import new_render_system
+from pipeline.physics import appearance
+from pipeline.physics.vulkan import new_render_system
 
 TABLE_BODY_ID = 0
 """Segmentation id of the table and of everything else that is not an object."""

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from pipeline.artifacts import ArtifactWriter, Provenance
-from pipeline.artifacts.sample_cache import cached_split
-from pipeline.artifacts.sample_messages import Samples, joined_samples, sample_batch
 from pipeline.artifacts.sharding import shard_entry, shard_path, write_index
 from pipeline.errors import ArtifactError
+from pipeline.messages.sample_cache import cached_split
+from pipeline.messages.samples import Samples, joined_samples, sample_batch
 
 
 def some_samples(count: int, seed: int) -> Samples:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.artifacts.reading import open_artifact
-from pipeline.artifacts.training_messages import epoch_message
+from pipeline.messages.training import epoch_message
 from pipeline.network.family import Member
 from pipeline.network.training import TrainedNetwork
 from schemas.softgrip.v1.training_pb2 import SweepNetwork

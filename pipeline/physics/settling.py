@@ -6,7 +6,7 @@ import sapien
 
 from pipeline.config.scenes import ScenesConfig
 from pipeline.errors import SceneError
-from pipeline.simulation.engine import Body
+from pipeline.physics.engine import Body
 
 
 def settle(world: sapien.Scene, bodies: Sequence[Body], config: ScenesConfig) -> float:

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.geometry.mesh import Mesh
-from pipeline.geometry.raycasting import RayScene
+from pipeline.world.raycasting import RayScene
 
 DOWN = np.array([0.0, 0.0, -1.0])
 

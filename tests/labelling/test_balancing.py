@@ -6,14 +6,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from pipeline.gripper.balancing import (
+from pipeline.labelling.balancing import (
     first_proposals,
     flattened,
     quality_histogram,
     rare_grasps,
     tenth_of,
 )
-from pipeline.gripper.sampling import Proposal
+from pipeline.labelling.sampling import Proposal
 
 LABELS = hnp.arrays(np.float64, st.integers(1, 200), elements=st.floats(0, 1))
 

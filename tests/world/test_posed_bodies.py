@@ -8,10 +8,10 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.geometry.compiled_poses import pose_of, quaternion_of, turn_between, turned
 from pipeline.geometry.mesh import Mesh
-from pipeline.geometry.posed_bodies import PosedBodies
-from pipeline.geometry.raycasting import RayScene
-from pipeline.geometry.table import table_mesh
 from pipeline.geometry.transforms import position_quaternion
+from pipeline.world.posed_bodies import PosedBodies
+from pipeline.world.raycasting import RayScene
+from pipeline.world.table import table_mesh
 
 SEEDS = st.integers(0, 2**32 - 1)
 

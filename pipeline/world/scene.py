@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from pipeline.sensing.view import CameraView
+from pipeline.world.view import CameraView
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from pipeline.geometry.mesh import Mesh
-from pipeline.geometry.raycasting import RayScene
 from pipeline.geometry.transforms import invert, transform_points
+from pipeline.world.raycasting import RayScene
 
 TABLE = 0
 NOTHING = -1

@@ -4,9 +4,9 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from pipeline.clutter.scene import ClutterScene
 from pipeline.config.evaluation import PolicyName
 from pipeline.control.success import Outcome, advantage, success_rate
+from pipeline.world.scene import ClutterScene
 from schemas.softgrip.v1.evaluation_pb2 import Attempt, Comparison, LevelResult
 
 ALL_LEVELS = 0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.config import GraspsConfig
-from pipeline.gripper.sampling import (
+from pipeline.labelling.sampling import (
     Proposal,
     VisibleSurface,
     contact_frames,

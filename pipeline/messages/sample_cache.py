@@ -17,9 +17,9 @@ from filelock import FileLock
 
 from pipeline.artifacts.publishing import file_sha256, write_error
 from pipeline.artifacts.reading import open_artifact
-from pipeline.artifacts.sample_messages import STORED_AS, Samples, samples_of
 from pipeline.artifacts.sharding import listed_shards, read_index
 from pipeline.errors import ArtifactError
+from pipeline.messages.samples import STORED_AS, Samples, samples_of
 from schemas.softgrip.v1.grasps_pb2 import ShardEntry
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 

@@ -9,7 +9,7 @@ subset whose histogram is nearer to flat. Both leave their mark in the sample
 import numpy as np
 from jaxtyping import Float, Int
 
-from pipeline.gripper.sampling import Proposal
+from pipeline.labelling.sampling import Proposal
 
 TENTHS = 10
 

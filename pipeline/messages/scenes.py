@@ -23,12 +23,12 @@ from pipeline.artifacts.reading import Artifact, open_artifact
 from pipeline.artifacts.tensors import from_tensor, to_tensor
 from pipeline.artifacts.writing import ArtifactWriter
 from pipeline.clutter.levels import level_of
-from pipeline.clutter.scene import ClutterScene, PlacedObject
 from pipeline.config.cameras import DepthSensor
 from pipeline.errors import ArtifactError, ContentError
 from pipeline.geometry.transforms import position_quaternion
-from pipeline.sensing.cameras import PinholeCamera
-from pipeline.sensing.view import CameraView
+from pipeline.world.cameras import PinholeCamera
+from pipeline.world.scene import ClutterScene, PlacedObject
+from pipeline.world.view import CameraView
 from schemas.softgrip.v1 import scenes_pb2
 
 TOPIC = "/scenes"

@@ -1,0 +1,1 @@
+"""Domain types to protobuf messages and back, one module a stage."""

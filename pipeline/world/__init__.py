@@ -1,0 +1,1 @@
+"""What lies where and what sees it: scenes, bodies at poses, one ray cast, one pinhole camera."""
