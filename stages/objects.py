@@ -54,7 +54,7 @@ def build(stage: StageContext) -> Summary:
     chosen = choose_subset(classes, config.limit, seed)
     split = choose_split({name: classes[name] for name in chosen}, stage.config.split, seed)
     split |= dict.fromkeys(added, "train")
-    cache = stage.folder.path.parent / ".cache" / "convex_parts"
+    cache = stage.folder.cache / "convex_parts"
     finish = partial(finished, config=config, seed=seed, cache=cache)
     todo = [item for item in measured if item.source.name in split]
     results = run_in_order(finish, todo, stage.workers, stage.executor)

@@ -1,8 +1,18 @@
-"""Files appear whole or not at all: written beside their place, flushed, renamed."""
+"""Files appear whole or not at all: written beside their place, flushed, renamed.
+
+What is being written lies in a scratch file whose name tells who writes it, so that two
+writers of one file share none and what a killed writer left can be told from what is alive.
+"""
 
 import errno
+import functools
 import hashlib
 import os
+import re
+import secrets
+import shutil
+import socket
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +24,12 @@ FULL = (errno.ENOSPC, errno.EDQUOT)
 FORBIDDEN = (errno.EACCES, errno.EPERM, errno.EROFS)
 CANNOT_WRITE = FULL + FORBIDDEN
 
+SCRATCH_SUFFIX = ".part"
+LONGEST_NAME_BYTES = 255  # of a file, on every file system of Linux
+# A writer on another machine cannot be asked whether it lives; none leaves its file alone so long.
+ABANDONED_AFTER_S = 24 * 3600.0
+_WRITER = re.compile(r"\.([0-9a-f]{8})-(\d+)-(\d+)-[0-9a-f]{8}\.part$")
+
 
 @contextmanager
 def published(path: Path) -> Iterator[Path]:
@@ -23,9 +39,10 @@ def published(path: Path) -> Iterator[Path]:
 
     Raises
     ------
-    ArtifactError : the disk is full or the folder cannot be written.
+    ArtifactError
+        The disk is full or the folder cannot be written.
     """
-    scratch = path.with_name(f".{path.name}.part")
+    scratch = scratch_beside(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield scratch
@@ -37,6 +54,33 @@ def published(path: Path) -> Iterator[Path]:
         raise write_error(path, error) from error
     finally:
         scratch.unlink(missing_ok=True)
+
+
+def scratch_beside(path: Path) -> Path:
+    """A new name beside ``path`` for what will become it; it tells this process and is hidden."""
+    writer = f"{_machine()}-{os.getpid()}-{_start_of(os.getpid())}-{secrets.token_hex(4)}"
+    ending = f".{writer}{SCRATCH_SUFFIX}"
+    room = LONGEST_NAME_BYTES - len(ending) - 1
+    return path.with_name(f".{path.name.encode()[:room].decode(errors='ignore')}{ending}")
+
+
+def remove_abandoned_scratch(folder: Path) -> list[Path]:
+    """Remove what killed writers left anywhere below ``folder``; what is being written stays.
+
+    Returns
+    -------
+    The scratch files and folders that were removed.
+    """
+    removed = []
+    for scratch in sorted(folder.rglob(f".*{SCRATCH_SUFFIX}")):
+        if not _is_abandoned(scratch):
+            continue
+        if scratch.is_dir():
+            shutil.rmtree(scratch, ignore_errors=True)
+        else:
+            scratch.unlink(missing_ok=True)
+        removed.append(scratch)
+    return removed
 
 
 def publish_bytes(path: Path, data: bytes) -> None:
@@ -69,6 +113,40 @@ def write_error(path: Path, error: OSError) -> ArtifactError:
     return ArtifactError(
         f"{path} could not be written: {error}", "Mend this and run the same command again"
     )
+
+
+def _is_abandoned(scratch: Path) -> bool:
+    """Whether the writer named in a scratch file's name has ended, as far as can be told here."""
+    writer = _WRITER.search(scratch.name)
+    if writer is not None and writer[1] == _machine():
+        return _start_of(int(writer[2])) != int(writer[3])
+    try:
+        idle_s = time.time() - scratch.stat().st_mtime
+    except FileNotFoundError:  # published, or removed by its writer, just now
+        return False
+    return idle_s > ABANDONED_AFTER_S
+
+
+@functools.cache
+def _machine() -> str:
+    """Where a process number means one process: machine, its boot, and the container's numbers."""
+    boot = Path("/proc/sys/kernel/random/boot_id").read_text().strip()
+    numbers = Path("/proc/self/ns/pid").readlink()
+    return hashlib.sha256(f"{socket.gethostname()} {boot} {numbers}".encode()).hexdigest()[:8]
+
+
+def _start_of(pid: int) -> int:
+    """When a process began [clock ticks since boot]; 0 where it has ended.
+
+    A number is given to another process in time, and that one began later.
+    """
+    try:
+        status = Path(f"/proc/{pid}/stat").read_text()
+    except (FileNotFoundError, ProcessLookupError):
+        return 0
+    fields = status.rpartition(")")[2].split()  # the name before may hold anything
+    state, start_ticks = fields[0], fields[19]
+    return 0 if state in "ZX" else int(start_ticks)
 
 
 def _flush_folder(folder: Path) -> None:

@@ -17,7 +17,7 @@ from filelock import FileLock, Timeout
 from loguru import logger
 
 from pipeline.artifacts import open_artifact, publish_bytes, read_provenance
-from pipeline.artifacts.publishing import CANNOT_WRITE, write_error
+from pipeline.artifacts.publishing import CANNOT_WRITE, remove_abandoned_scratch, write_error
 from pipeline.config import load_run_config
 from pipeline.errors import ArtifactError, ConfigError, SoftgripError
 from pipeline.execution.commands import EXIT_FAILURE, words_to
@@ -178,8 +178,11 @@ def _exclusive(folder: RunFolder, stage: Stage) -> Iterator[None]:
         ) from error
     try:
         owner.write_text(f"process {os.getpid()} (stage {stage.name})\n")
+        for place in (folder.path, folder.cache):
+            remove_abandoned_scratch(place)
         yield
     finally:
+        remove_abandoned_scratch(folder.path)  # of workers that were killed
         owner.unlink(missing_ok=True)
         lock.release()
 

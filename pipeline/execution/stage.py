@@ -61,6 +61,11 @@ class RunFolder:
         return self.path / ".state" / name
 
     @property
+    def cache(self) -> Path:
+        """What all runs share and can be made again."""
+        return self.path.parent / ".cache"
+
+    @property
     def config(self) -> Path:
         """The run's configuration."""
         return self.path / "run.toml"

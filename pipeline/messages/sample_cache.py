@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from filelock import FileLock
 
-from pipeline.artifacts.publishing import file_sha256, write_error
+from pipeline.artifacts.publishing import file_sha256, scratch_beside, write_error
 from pipeline.artifacts.reading import open_artifact
 from pipeline.artifacts.sharding import listed_shards, read_index
 from pipeline.errors import ArtifactError
@@ -46,8 +46,9 @@ def cached_split(index: Path, split: str, cache: Path) -> Samples:
     with FileLock(cache / f"{split}.lock"):
         if not folder.is_dir():
             shards = dict(zip(listed_shards(index, [split]), entries, strict=True))
-            scratch = cache / f".{split}.part"
-            shutil.rmtree(scratch, ignore_errors=True)
+            for left in cache.glob(f".{split}.*part"):  # of one killed: this one holds the lock
+                shutil.rmtree(left, ignore_errors=True)
+            scratch = scratch_beside(cache / split)
             try:
                 scratch.mkdir()
                 decode_shards(shards, scratch)
