@@ -16,6 +16,7 @@ from pipeline.config.evaluation import (
 from pipeline.config.grasps import GraspsConfig, GripperConfig, PadConfig, SensingConfig
 from pipeline.config.learning import NetworkConfig, ShardsConfig, SweepConfig, TrainConfig
 from pipeline.config.objects import ConvexPartsConfig, ObjectsConfig, SplitConfig
+from pipeline.config.referee import RefereeConfig
 from pipeline.config.scenes import ClutterCounts, ScenesConfig
 from pipeline.config.tree import RunConfig, load_run_config, section_digest
 
@@ -33,6 +34,7 @@ __all__ = [
     "PadConfig",
     "PolicyConfig",
     "RecordingConfig",
+    "RefereeConfig",
     "RunConfig",
     "ScenesConfig",
     "SensingConfig",

@@ -23,6 +23,7 @@ from pipeline.config.evaluation import EvaluateConfig, RecordingConfig
 from pipeline.config.grasps import CELL_SIDE, GraspsConfig, GripperConfig, SensingConfig
 from pipeline.config.learning import NetworkConfig, ShardsConfig, SweepConfig, TrainConfig
 from pipeline.config.objects import ObjectsConfig, SplitConfig
+from pipeline.config.referee import RefereeConfig
 from pipeline.config.scenes import ScenesConfig
 from pipeline.config.section import Section
 from pipeline.errors import ConfigError
@@ -48,6 +49,7 @@ class RunConfig(Section):
     network: NetworkConfig = NetworkConfig()
     train: TrainConfig = TrainConfig()
     sweep: SweepConfig = SweepConfig()
+    referee: RefereeConfig = RefereeConfig()
     evaluate: EvaluateConfig = EvaluateConfig()
     recording: RecordingConfig = RecordingConfig()
     dataset: DatasetConfig = DatasetConfig()

@@ -1,0 +1,207 @@
+"""The largest load that contact pressure and friction balance while the vacuum pulls.
+
+The object is at rest where the vacuum's wrench, contact and load sum to zero. Contact pushes along
+the surface, never pulls, and rubs within Coulomb's cone; how it spreads over the patches that touch
+is free: the load is borne if any spread balances it (the static theorem of limit analysis). Cones
+are replaced by pyramids inside them, so this is a linear program in the multipliers of a few
+hundred wrenches, by SciPy's HiGHS, and one load is checked by non-negative least squares.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.optimize import linprog, nnls
+
+from pipeline.referee.disc import Disc
+
+FRICTION_SIDES = 12  # of the pyramid in Coulomb's cone: 3.4 % less at most
+BALANCED = 1e-6  # of the largest force in play
+INFEASIBLE, UNBOUNDED = 2, 3  # what linprog says
+
+
+@dataclass(frozen=True, eq=False)
+class Hold:
+    """What the pad can do to the object, as wrenches about the pad's origin in GCS.
+
+    Attributes
+    ----------
+    suction
+        Force [N] and moment [N m] of the vacuum on the object, shape (6,).
+    contact
+        Wrenches of contact, a column each of a unit push with its friction, shape (6, m).
+    radius_m
+        r_G, by which moments are made comparable with forces [m].
+    """
+
+    suction: Float[np.ndarray, " 6"]
+    contact: Float[np.ndarray, "6 m"]
+    radius_m: float
+
+    def bears(self, load: Float[np.ndarray, " 6"]) -> bool:
+        """Whether a load is balanced.
+
+        Parameters
+        ----------
+        load
+            Force [N] and moment [N m] that the object exerts on the pad about its origin, in GCS,
+            shape (6,): its weight and inertia. A pull away from the pad is along -z.
+        """
+        wanted = self._scaled(-(load + self.suction))
+        # SciPy's nnls ends the process on a matrix without columns.
+        residual = (
+            nnls(self._scaled(self.contact), wanted)[1]
+            if self.contact.shape[1]
+            else np.linalg.norm(wanted)
+        )
+        largest = max(float(np.abs(self._scaled(self.suction)).max()), float(np.abs(wanted).max()))
+        return bool(residual <= BALANCED * largest)
+
+    def largest_scale(self, load: Float[np.ndarray, " 6"]) -> float:
+        """The largest t for which t times the load is borne.
+
+        Parameters
+        ----------
+        load
+            As in `bears`, shape (6,).
+
+        Returns
+        -------
+        t ≥ 0; 0 where nothing is held at all, inf where the load presses on for ever.
+        """
+        columns = np.column_stack([self._scaled(self.contact), self._scaled(load)])
+        cost = np.zeros(columns.shape[1])
+        cost[-1] = -1.0
+        found = linprog(cost, A_eq=columns, b_eq=self._scaled(-self.suction), method="highs")
+        if found.status == INFEASIBLE:
+            return 0.0
+        return np.inf if found.status == UNBOUNDED else float(found.x[-1])
+
+    def _scaled(self, wrenches: Float[np.ndarray, "6 *more"]) -> Float[np.ndarray, "6 *more"]:
+        """With moments over r_G."""
+        unit = np.array([1.0, 1.0, 1.0, *(3 * [1.0 / self.radius_m])])
+        return np.asarray((wrenches.T * unit).T)
+
+
+def suction_wrench(
+    disc: Disc,
+    vacuum_pa: Float[np.ndarray, " n"],
+    surface_m: Float[np.ndarray, " n"],
+    on_target: Bool[np.ndarray, " n"],
+) -> Float[np.ndarray, " 6"]:
+    """The vacuum's wrench on the object: p (-∂s/∂x, -∂s/∂y, 1) over the elements' area.
+
+    Gradients are those of the elements, so that the walls of a pit under an even vacuum cancel.
+
+    Parameters
+    ----------
+    disc
+        The pad's elements.
+    vacuum_pa
+        p under the face, shape (n,) [Pa].
+    surface_m, on_target
+        Height of the surface and whether it is the object's, shape (n,), GCS.
+    """
+    x, y = disc.vertices_xy_m.T
+    pulls = np.where(on_target, vacuum_pa * disc.areas_m2, 0.0)
+    wrench = np.array([0.0, 0.0, pulls.sum(), y @ pulls, -(x @ pulls), 0.0])
+    inside = on_target[disc.triangles].all(axis=1)
+    corners = disc.triangles[inside]
+    area = disc.triangle_areas_m2[inside]
+    height = surface_m[corners]
+    cx, cy = x[corners], y[corners]
+    slope_x, slope_y = (
+        sum(height[:, k] * (c[:, (k + 1) % 3] - c[:, (k + 2) % 3]) for k in range(3)) / (2 * area)
+        for c in (cy, -cx)
+    )
+    push = vacuum_pa[corners].mean(axis=1) * area
+    fx, fy = -push * slope_x, -push * slope_y
+    z = height.mean(axis=1)
+    wrench[0] += fx.sum()
+    wrench[1] += fy.sum()
+    wrench[3] -= z @ fy
+    wrench[4] += z @ fx
+    wrench[5] += cx.mean(axis=1) @ fy - cy.mean(axis=1) @ fx
+    return wrench
+
+
+def contact_wrenches(
+    disc: Disc,
+    touches: Bool[np.ndarray, " n"],
+    surface_m: Float[np.ndarray, " n"],
+    normals: Float[np.ndarray, "n 3"],
+    friction: float,
+) -> Float[np.ndarray, "6 m"]:
+    """Wrenches of a unit push on each patch that touches, with friction to every side.
+
+    Parameters
+    ----------
+    disc
+        The pad's elements and patches.
+    touches
+        Vertices in contact with the object, shape (n,).
+    surface_m, normals
+        Of the surface there, shapes (n,) and (n, 3), GCS.
+    friction
+        μ [1].
+
+    Returns
+    -------
+    A column for each patch and side, shape (6, patches * FRICTION_SIDES).
+    """
+    area = np.where(touches, disc.areas_m2, 0.0)
+    points = np.column_stack([disc.vertices_xy_m, np.where(touches, surface_m, 0.0)])
+    total = np.bincount(disc.patch, area)
+    used = total > 0.0
+
+    def of_patches(values: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "patches 3"]:
+        sums = [np.bincount(disc.patch, area * values[:, axis]) for axis in range(3)]
+        return np.asarray(np.column_stack(sums)[used])
+
+    centres = of_patches(points) / total[used, None]
+    mean = of_patches(normals)
+    mean /= np.linalg.norm(mean, axis=1, keepdims=True)
+    # Two tangents that turn and mirror with the normal: along the steepest descent, and across.
+    steep = mean[:, :2] / np.maximum(np.linalg.norm(mean[:, :2], axis=1, keepdims=True), 1e-9)
+    level = np.linalg.norm(mean[:, :2], axis=1) < 1e-9
+    steep[level] = (1.0, 0.0)
+    across = np.column_stack([-steep[:, 1], steep[:, 0], np.zeros(len(steep))])
+    along = np.cross(across, mean)
+    angle = 2 * np.pi * np.arange(FRICTION_SIDES) / FRICTION_SIDES
+    rubs = (
+        np.cos(angle)[None, :, None] * along[:, None]
+        + np.sin(angle)[None, :, None] * (across[:, None])
+    )
+    forces = (-mean[:, None] + friction * rubs).reshape(-1, 3)
+    moments = np.cross(np.repeat(centres, FRICTION_SIDES, axis=0), forces)
+    return np.concatenate([forces.T, moments.T])
+
+
+def weight_loads(
+    gripper_from_world: Float[np.ndarray, "4 4"],
+    centre_of_mass_m: Float[np.ndarray, " 3"],
+    up_m_s2: float,
+    side_m_s2: float,
+) -> Float[np.ndarray, "4 6"]:
+    """Loads of one kilogram that is lifted while the gripper moves to one of four sides.
+
+    Parameters
+    ----------
+    gripper_from_world
+        Shape (4, 4); gravity is along -z of the world.
+    centre_of_mass_m
+        Of the object, shape (3,), in the world [m].
+    up_m_s2, side_m_s2
+        Upwards, gravity among it, and sidewards [m/s2].
+
+    Returns
+    -------
+    A load a row about the pad's origin in GCS, shape (4, 6) [N/kg, N m/kg].
+    """
+    rotation, origin = gripper_from_world[:3, :3], gripper_from_world[:3, 3]
+    centre = rotation @ centre_of_mass_m + origin
+    loads = []
+    for x, y in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)):
+        force = rotation @ np.array([-side_m_s2 * x, -side_m_s2 * y, -up_m_s2])
+        loads.append(np.concatenate([force, np.cross(centre, force)]))
+    return np.array(loads)
