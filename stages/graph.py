@@ -13,11 +13,13 @@ import typer
 from loguru import logger
 
 from pipeline.artifacts import publish_bytes
+from pipeline.config import load_run_config
+from pipeline.errors import ConfigError
 from pipeline.execution.commands import run_command
 from pipeline.execution.freshness import key_from_json
 from pipeline.execution.running import built_key, is_fresh, missing_shards, stage_context
 from pipeline.execution.stage import RunFolder, Stage
-from pipeline.geometry.mesh_folders import list_mesh_files
+from pipeline.geometry.mesh_folders import FAMILIES_FILE, list_mesh_files
 
 OBJECTS = Stage("objects", ("seed", "objects", "split", "recording.objects"))
 SCENES = Stage("scenes", ("seed", "scenes", "cameras", "recording.scenes"), ("objects",))
@@ -49,7 +51,21 @@ def inputs_of(stage: Stage, folder: RunFolder, mesh_dir: Path | None) -> dict[st
     if stage is OBJECTS and mesh_dir is not None:
         files = list_mesh_files(mesh_dir)
         inputs |= {f"meshes/{path.relative_to(mesh_dir).as_posix()}": path for path in files}
+    if stage is OBJECTS and (families := families_file(folder, mesh_dir)):
+        inputs[FAMILIES_FILE] = families
     return inputs
+
+
+def families_file(folder: RunFolder, mesh_dir: Path | None) -> Path | None:
+    """Where families are declared: the file that run.toml names, else the mesh folder's, if any."""
+    named = load_run_config(folder.config).split.families
+    if named:
+        path = folder.path / named
+        if not path.is_file():
+            raise ConfigError(f"{path} is missing, and split.families names it", "Put it there")
+        return path
+    beside = mesh_dir / FAMILIES_FILE if mesh_dir else None
+    return beside if beside and beside.is_file() else None
 
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)

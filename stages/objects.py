@@ -2,15 +2,16 @@
 
 import difflib
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Mapping
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from functools import partial
 from pathlib import Path
 
 from loguru import logger
 
-from pipeline.artifacts import ArtifactWriter
-from pipeline.config import ObjectsConfig
+from pipeline.artifacts import ArtifactWriter, publish_bytes
+from pipeline.config import ObjectsConfig, section_digest
 from pipeline.errors import ConfigError, MeshError
 from pipeline.execution import (
     StageContext,
@@ -25,13 +26,16 @@ from pipeline.geometry.catalogue import (
     MeasuredObject,
     finish_object,
     measure_object,
-    stretched_copy,
 )
-from pipeline.geometry.mesh_folders import object_names
+from pipeline.geometry.families import DeclaredFamily, read_declared
+from pipeline.geometry.mesh_folders import FAMILIES_FILE, object_names
 from pipeline.geometry.parametric import PARAMETRIC_OBJECTS, parametric_source
-from pipeline.geometry.selection import choose_split, choose_subset
+from pipeline.geometry.selection import Split, choose_subset
+from pipeline.geometry.settled import SETTLED_FILE, read_settled
+from pipeline.geometry.splits import split_objects
+from pipeline.geometry.stretching import near_held_out, stretched_copies
 from pipeline.geometry.urdf_files import load_object_file, standalone
-from pipeline.messages.objects import REFUSED_TOPIC, TOPIC, object_message
+from pipeline.messages.objects import REFUSED_TOPIC, TOPIC, object_message, refused_message
 from pipeline.recording.objects import blueprint, show_catalogue
 from pipeline.recording.recording import recording, spread
 from schemas.softgrip.v1.objects_pb2 import RefusedMesh
@@ -45,28 +49,55 @@ def build(stage: StageContext) -> Summary:
     config, seed = stage.config.objects, stage.config.seed
     jobs, added = sources(stage)
     measured, refused = measure(stage, jobs)
-    classes = {
-        item.source.name: item.shape_class for item in measured if item.source.name not in added
-    }
+    items = {item.source.name: item for item in measured}
+    classes = {name: item.shape_class for name, item in items.items() if name not in added}
     if not classes:
         raise MeshError("Not one mesh could be used", "See the reasons above, or unset MESH_DIR")
-    check_transparent(config, sorted({*classes, *added}))
-    chosen = choose_subset(classes, config.limit, seed)
-    split = choose_split({name: classes[name] for name in chosen}, stage.config.split, seed)
-    split |= dict.fromkeys(added, "train")
+    check_transparent(config, sorted(items))
+    taken = {*choose_subset(classes, config.limit, seed), *added}
+    settled_in = stage.folder.state(SETTLED_FILE)
+    settled = read_settled(settled_in, settling_basis(stage))
+    split, families = split_objects(
+        [item for name, item in items.items() if name in taken],
+        added & items.keys(),
+        declared_families(stage),
+        stage.config.split,
+        seed,
+        settled,
+    )
+    refused += [told(items[name].source.label, why) for name, why in families.joining.items()]
     cache = stage.folder.cache / "convex_parts"
     finish = partial(finished, config=config, seed=seed, cache=cache)
-    todo = [item for item in measured if item.source.name in split]
+    todo = [item for name, item in items.items() if name in split]
     results = run_in_order(finish, todo, stage.workers, stage.executor)
-    objects = list(progress(results, len(todo), "objects: convex parts", "object"))
+    bare = progress(results, len(todo), "objects: convex parts", "object")
+    objects = [replace(item, family=families.of[item.name]) for item in bare]
     copies = stretched_copies(
-        [item for item in objects if split[item.name] == "train"], config, seed
+        [item for item in objects if split[item.name] == "train"],
+        items,
+        config,
+        partial(generator, seed, "object"),
     )
-    check_names(copies, split)
-    objects += copies
-    split |= dict.fromkeys((item.name for item in copies), "train")
-    publish(stage, objects, dict(split), refused)
-    return summary(objects, dict(split), refused)
+    held_out = {name: items[name].descriptor for name, where in split.items() if where != "train"}
+    near = near_held_out(copies, held_out, stage.config.split.family_threshold)
+    objects += [item for item in copies if item.name not in near]
+    splits = split | dict.fromkeys((i.name for i in copies if i.name not in near), "train")
+    now = settled.with_splits({items[name].content: where for name, where in split.items()})
+    publish_bytes(settled_in, now.to_json().encode())
+    publish(stage, objects, splits, refused)
+    return summary(objects, splits, refused) | {"stretched_near_held_out": near}
+
+
+def settling_basis(stage: StageContext) -> str:
+    """What settled splits rest on: with another seed or way of splitting, all are split anew."""
+    sections = ("seed", "split", "objects.embedded_in_training")
+    return section_digest(stage.config, sections)
+
+
+def declared_families(stage: StageContext) -> tuple[DeclaredFamily, ...]:
+    """The families that run.toml's file, or else the mesh folder's, declares."""
+    path = stage.inputs.get(FAMILIES_FILE)
+    return read_declared(path) if path else ()
 
 
 def sources(stage: StageContext) -> tuple[list[Source], frozenset[str]]:
@@ -107,21 +138,27 @@ def measure(
     stage: StageContext, jobs: list[Source]
 ) -> tuple[list[MeasuredObject], list[RefusedMesh]]:
     """Load, repair and measure every source; what is refused is named, the others go on."""
-    job = partial(measured_or_refused, config=stage.config.objects, folder=stage.mesh_dir)
+    job = partial(measured_or_why_not, config=stage.config.objects, folder=stage.mesh_dir)
     results = run_in_order(job, jobs, stage.workers, stage.executor)
     measured, refused = [], []
-    for result in progress(results, len(jobs), "objects: repair and NSVR", "mesh"):
-        if isinstance(result, RefusedMesh):
-            logger.warning("left out: {}. {}", result.reason, result.remedy)
-            refused.append(result)
+    shown = progress(results, len(jobs), "objects: repair and NSVR", "mesh")
+    for (_, name), result in zip(jobs, shown, strict=True):
+        if isinstance(result, MeshError):
+            refused.append(told(name, result))
         else:
             measured.append(result)
     return measured, refused
 
 
-def measured_or_refused(
+def told(name: str, why: MeshError) -> RefusedMesh:
+    """The record of a source that is left out, and a word to the reader."""
+    logger.warning("left out: {}", why)
+    return refused_message(name, why)
+
+
+def measured_or_why_not(
     job: Source, config: ObjectsConfig, folder: Path | None
-) -> MeasuredObject | RefusedMesh:
+) -> MeasuredObject | MeshError:
     """One source measured, or why it cannot be."""
     path, name = job
     try:
@@ -129,40 +166,20 @@ def measured_or_refused(
             return measure_object(parametric_source(name), config)
         return measure_object(load_object_file(path, folder, name, config), config)
     except MeshError as error:
-        return RefusedMesh(source=name, reason=error.what, remedy=error.remedy)
+        return error
 
 
 def finished(
     measured: MeasuredObject, config: ObjectsConfig, seed: int, cache: Path
 ) -> CatalogueObject:
     """Rescale one object and cut it into convex parts."""
-    return finish_object(measured, config, generator(seed, "object", measured.source.name), cache)
-
-
-def stretched_copies(
-    items: list[CatalogueObject], config: ObjectsConfig, seed: int
-) -> list[CatalogueObject]:
-    """As many further shapes of each object as are asked for."""
-    return [
-        stretched_copy(item, name, config, generator(seed, "object", name))
-        for item in items
-        for name in (f"{item.name}-stretched-{k + 1}" for k in range(config.stretched_copies))
-    ]
-
-
-def check_names(copies: list[CatalogueObject], taken: Collection[str]) -> None:
-    """Raise MeshError where a copy's name is that of an object."""
-    for item in copies:
-        if item.name in taken:
-            raise MeshError(
-                f"A mesh is named {item.name}, as a stretched copy would be", "Rename its file"
-            )
+    return finish_object(measured, config, generator(seed, "object", measured.content), cache)
 
 
 def publish(
     stage: StageContext,
     objects: list[CatalogueObject],
-    split: dict[str, str],
+    split: Mapping[str, Split],
     refused: list[RefusedMesh],
 ) -> None:
     """Write the recording, then the artifact: what is there last makes the stage whole."""
@@ -178,13 +195,14 @@ def publish(
 
 
 def summary(
-    objects: list[CatalogueObject], split: dict[str, str], refused: list[RefusedMesh]
+    objects: list[CatalogueObject], split: Mapping[str, Split], refused: list[RefusedMesh]
 ) -> Summary:
     """The stage's headline figures."""
     return {
         "objects": len(objects),
         "by_class": dict(sorted(Counter(str(item.shape_class) for item in objects).items())),
         "by_split": dict(sorted(Counter(split.values()).items())),
+        "families": len({item.family for item in objects}),
         "transparent": sorted(item.name for item in objects if item.material == "transparent"),
         "repaired": sum(bool(item.repairs) for item in objects),
         "nsvr": {item.name: round(item.nsvr, 6) for item in objects},

@@ -7,6 +7,7 @@ import trimesh
 
 from pipeline.config import ObjectsConfig
 from pipeline.geometry.catalogue import CatalogueObject, MeasuredObject, finish_object
+from pipeline.geometry.descriptor import describe
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.mesh_files import MeshSource
 from pipeline.geometry.shape import nsvr, shape_class
@@ -27,7 +28,7 @@ def catalogue_object(
     config = ObjectsConfig(
         target_extent_min_m=extent, target_extent_max_m=extent, density_kg_m3=density_kg_m3
     )
-    measured = MeasuredObject(source, mesh, (), value, shape_class(value))
+    measured = MeasuredObject(source, mesh, (), value, shape_class(value), describe(mesh))
     return finish_object(measured, config, np.random.default_rng(0), cache)
 
 

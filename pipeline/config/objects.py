@@ -69,8 +69,19 @@ class ObjectsConfig(Section):
 
 
 class SplitConfig(Section):
-    """Split by object: no object is ever in two of train, val, test."""
+    """Split by family of objects: no family is ever in two of train, val, test."""
 
+    families: str = Field(
+        "", description="file beside run.toml that declares families; else the mesh folder's"
+    )
+    # Measured on 47 scans and 65 embedded shapes: from 0.035 to 0.040 the families are the same
+    # (balls; cubes; cans; lemon and peach; screwdrivers; ...), at 0.05 balls and cubes are one.
+    family_threshold: float = Field(
+        0.038,
+        ge=0,
+        le=1,
+        description="shapes less unlike than this are one family [1]",
+    )
     val_fraction: float = Field(0.15, gt=0, lt=1, description="share of objects for validation")
     test_fraction: float = Field(0.25, gt=0, lt=1, description="share of objects for test")
 

@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from pipeline.config.objects import ObjectsConfig
 from pipeline.geometry.convex_parts import convex_parts
+from pipeline.geometry.descriptor import ShapeDescriptor, describe
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.mesh_files import MeshSource, UnitSource
 from pipeline.geometry.repair import repair
@@ -23,6 +24,8 @@ from pipeline.geometry.shape import (
 )
 
 Material = Literal["opaque", "transparent"]
+EMBEDDED = "parametric"
+"""Label and digest of an embedded object's source."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +37,12 @@ class MeasuredObject:
     repairs: tuple[str, ...]
     nsvr: float
     shape_class: ShapeClass
+    descriptor: ShapeDescriptor
+
+    @property
+    def content(self) -> str:
+        """What the object is known by, whatever it is called."""
+        return content_of(self.source.name, self.source.sha256)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,13 +77,30 @@ class CatalogueObject:
     """Closed convex collision shapes, in the object's frame."""
     material: Material
     """What depth cameras make of it."""
+    family: str = ""
+    """Objects of one family are alike, and all in one split."""
+    copies: tuple[str, ...] = ()
+    """Further files of the same surface, left out."""
+
+    @property
+    def content(self) -> str:
+        """What the object is known by, whatever it is called."""
+        return content_of(self.name, self.source_sha256)
+
+
+def content_of(name: str, sha256: str) -> str:
+    """Digest of a mesh's file; an embedded object goes by its name.
+
+    The last digits of an embedded object's vertices may differ between machines.
+    """
+    return name if sha256 == EMBEDDED else sha256
 
 
 def measure_object(source: MeshSource, config: ObjectsConfig) -> MeasuredObject:
     """Repair and NSVR. Raises MeshError where the source must be refused."""
     mesh, repairs = repair(source.label, source.mesh, config.max_hole_fraction)
     value = nsvr(mesh)
-    return MeasuredObject(source, mesh, repairs, value, shape_class(value))
+    return MeasuredObject(source, mesh, repairs, value, shape_class(value), describe(mesh))
 
 
 def finish_object(

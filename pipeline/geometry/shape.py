@@ -7,6 +7,7 @@ from typing import TypedDict
 import numpy as np
 from jaxtyping import Float
 
+from pipeline.geometry import topology
 from pipeline.geometry.mesh import Mesh
 
 TYPICAL_FROM = 2.6
@@ -69,14 +70,28 @@ def volume(mesh: Mesh) -> float:
 
 
 def nsvr(mesh: Mesh) -> float:
-    """NSVR of Eq. (15): sqrt(A) / cbrt(V) of a closed mesh [1]; the same at every scale.
+    """NSVR of Eq. (15): sqrt(A) / cbrt(V) of a closed mesh's outer surface [1]; free of scale.
 
     Raises ValueError where the volume is not positive: open or inverted surfaces have no NSVR.
     """
-    enclosed = volume(mesh)
+    outer = outer_surface(mesh)
+    enclosed = volume(outer)
     if not enclosed > 0.0:
         raise ValueError(f"NSVR needs a positive volume, got {enclosed}")
-    return float(np.sqrt(surface_area(mesh)) / np.cbrt(enclosed))
+    return float(np.sqrt(surface_area(outer)) / np.cbrt(enclosed))
+
+
+def outer_surface(mesh: Mesh) -> Mesh:
+    """A closed mesh without the inward shells that bound its cavities; itself if it has none."""
+    if topology.is_connected(mesh):
+        return mesh
+    shells = topology.components(mesh.faces)
+    reference = _reference(mesh)
+    tetrahedra = _tetrahedra(mesh, reference)[1]
+    outward = [shell for shell in shells if tetrahedra[shell].sum() > 0.0]
+    if len(outward) in (0, len(shells)):
+        return mesh
+    return topology.submesh(mesh, np.sort(np.concatenate(outward)))
 
 
 def shape_class(value: float) -> ShapeClass:

@@ -3,6 +3,8 @@
 import numpy as np
 import trimesh
 from jaxtyping import Float, Int
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from pipeline.geometry.mesh import Mesh
 
@@ -64,6 +66,14 @@ def components(faces: Int[np.ndarray, "m 3"]) -> list[Int[np.ndarray, " k"]]:
     )
     groups = [np.flatnonzero(labels == label) for label in range(int(labels.max()) + 1)]
     return sorted(groups, key=lambda group: (-len(group), int(group[0])))
+
+
+def is_connected(mesh: Mesh) -> bool:
+    """Whether all vertices that faces use hang together: quicker to tell than the components."""
+    edges, n = directed_edges(mesh.faces), len(mesh.vertices_m)
+    links = coo_array((np.ones(len(edges), dtype=np.int8), (edges[:, 0], edges[:, 1])), (n, n))
+    _, labels = connected_components(links, directed=False)
+    return bool((labels[mesh.faces[:, 0]] == labels[mesh.faces[0, 0]]).all())
 
 
 def is_closed(mesh: Mesh) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 from pipeline.artifacts.names import file_name
 from pipeline.artifacts.reading import open_artifact
 from pipeline.artifacts.tensors import from_tensor, set_tensors, tensors_of, to_tensor
-from pipeline.errors import ContentError
+from pipeline.errors import ContentError, MeshError
 from pipeline.geometry.catalogue import CatalogueObject, Material
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.mesh_files import UnitSource
@@ -18,6 +18,11 @@ from schemas.softgrip.v1 import objects_pb2
 TOPIC = "/objects"
 REFUSED_TOPIC = "/refused"
 MESH_STORED_AS = {"vertices_m": "f8", "faces": "u4"}
+
+
+def refused_message(label: str, error: MeshError) -> objects_pb2.RefusedMesh:
+    """The message of a source that did not become an object."""
+    return objects_pb2.RefusedMesh(source=label, reason=error.what, remedy=error.remedy)
 
 
 def object_message(item: CatalogueObject, split: str) -> objects_pb2.CatalogueObject:
@@ -42,6 +47,8 @@ def object_message(item: CatalogueObject, split: str) -> objects_pb2.CatalogueOb
         mesh=_mesh_message(item.mesh),
         convex_parts=[_mesh_message(part) for part in item.convex_parts],
         material=item.material,
+        family=item.family,
+        copies=item.copies,
     )
 
 
@@ -74,6 +81,8 @@ def object_of(message: objects_pb2.CatalogueObject) -> CatalogueObject:
         mesh=_mesh(message.mesh),
         convex_parts=tuple(_mesh(part) for part in message.convex_parts),
         material=cast(Material, message.material),
+        family=message.family,
+        copies=tuple(message.copies),
     )
 
 

@@ -21,6 +21,7 @@ from pipeline.config import (
 )
 from pipeline.errors import MachineError
 from pipeline.geometry.catalogue import CatalogueObject, MeasuredObject, finish_object
+from pipeline.geometry.descriptor import describe
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.mesh_files import MeshSource
 from pipeline.geometry.shape import nsvr, shape_class
@@ -48,7 +49,7 @@ def made_object(name: str, shape: trimesh.Trimesh, cache: object) -> CatalogueOb
     mesh = Mesh(np.asarray(shape.vertices), np.asarray(shape.faces))
     source = MeshSource(name, name, "none", mesh, "m", "declared")
     value = nsvr(mesh)
-    measured = MeasuredObject(source, mesh, (), value, shape_class(value))
+    measured = MeasuredObject(source, mesh, (), value, shape_class(value), describe(mesh))
     config = ObjectsConfig(
         target_extent_min_m=0.1, target_extent_max_m=0.1, transparent=("glass*",)
     )

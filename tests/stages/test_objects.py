@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 import trimesh
 
-from pipeline.errors import MeshError
+from pipeline.errors import ConfigError, MeshError
 from pipeline.execution import RunFolder, StageContext
 from pipeline.execution.running import stage_context
 from pipeline.geometry.parametric import PARAMETRIC_OBJECTS
@@ -77,6 +77,47 @@ def test_a_mesh_of_a_copys_name_is_an_error(tmp_path: Path, mesh_dir: Path) -> N
     config = "[objects]\nstretched_copies = 1\n[objects.convex]\ninput_faces = 200\n"
     with pytest.raises(MeshError, match=r"is named box.*-stretched-1, as a stretched copy would"):
         objects.build(context(tmp_path, mesh_dir, config))
+
+
+def test_no_family_stands_in_two_splits_and_splits_stay(tmp_path: Path, mesh_dir: Path) -> None:
+    """Balls of any size are one family, two boxes are declared one; then meshes are added."""
+    for number in range(3):
+        ball = trimesh.creation.icosphere(subdivisions=3, radius=0.03 + 0.01 * number)
+        ball.export(mesh_dir / f"ball_{number}.ply")
+    (mesh_dir / "families.toml").write_text('pair = ["box_0", "box_3"]\n')
+    config = "[objects]\nstretched_copies = 1\n[objects.convex]\ninput_faces = 200\n"
+    stage = context(tmp_path, mesh_dir, config)
+    objects.build(stage)
+    first = read_objects(stage.output)
+    families: dict[str, set[str]] = {}
+    for item, where in first.values():
+        families.setdefault(item.family, set()).add(where)
+    assert all(len(places) == 1 for places in families.values()), families
+    assert first["box_0"][0].family == first["box_3"][0].family == "pair"
+    assert len({first[f"ball_{k}"][0].family for k in range(3)}) == 1
+    trimesh.creation.capsule(0.1, 0.02).export(mesh_dir / "a_capsule.ply")
+    trimesh.creation.icosphere(subdivisions=2, radius=0.05).export(mesh_dir / "ball_9.ply")
+    again = stage_context(OBJECTS, stage.folder, inputs_of, mesh_dir, workers=1)
+    objects.build(again)
+    second = read_objects(again.output)
+    originals = {name for name in first if "stretched" not in name}
+    assert {name: second[name][1] for name in originals} == {n: first[n][1] for n in originals}
+    assert second["ball_9"][1] == second["ball_0"][1]
+    for name in originals:
+        assert second[name][0].mesh.vertices_m.tobytes() == first[name][0].mesh.vertices_m.tobytes()
+
+
+def test_families_are_declared_in_a_file_that_run_toml_names(
+    tmp_path: Path, mesh_dir: Path
+) -> None:
+    with pytest.raises(ConfigError, match=r"mine\.toml is missing, and split\.families names it"):
+        context(tmp_path, mesh_dir, '[split]\nfamilies = "mine.toml"\n')
+    (tmp_path / "runs" / "one" / "mine.toml").write_text('boxes = ["box_*"]')
+    (mesh_dir / "families.toml").write_text("not TOML")
+    folder = RunFolder(tmp_path / "runs" / "one")
+    stage = stage_context(OBJECTS, folder, inputs_of, mesh_dir, workers=1)
+    (family,) = objects.declared_families(stage)
+    assert family.name == "boxes"
 
 
 def test_a_run_takes_meshes_or_embedded_objects_unless_told_otherwise(

@@ -1,0 +1,63 @@
+"""Further shapes for training: objects stretched along their axes, none like a held-out one."""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+
+import numpy as np
+
+from pipeline.config.objects import ObjectsConfig
+from pipeline.errors import MeshError
+from pipeline.geometry.catalogue import CatalogueObject, stretched_copy
+from pipeline.geometry.descriptor import ShapeDescriptor, describe, shape_distance
+
+
+def stretched_copies(
+    items: Sequence[CatalogueObject],
+    taken: Collection[str],
+    config: ObjectsConfig,
+    rng_of: Callable[[str], np.random.Generator],
+) -> list[CatalogueObject]:
+    """As many further shapes of each object as are asked for, each of its object's family.
+
+    Parameters
+    ----------
+    items
+        The objects to stretch.
+    taken
+        Names that no copy may have.
+    rng_of
+        The random stream of one copy, by its object's content and its number.
+
+    Raises
+    ------
+    MeshError
+        A copy would have the name of an object.
+    """
+    copies = [
+        stretched_copy(
+            item,
+            f"{item.name}-stretched-{k}",
+            config,
+            rng_of(f"{item.content}-stretched-{k}"),
+        )
+        for item in items
+        for k in range(1, config.stretched_copies + 1)
+    ]
+    for item in copies:
+        if item.name in taken:
+            raise MeshError(
+                f"A mesh is named {item.name}, as a stretched copy would be", "Rename its file"
+            )
+    return copies
+
+
+def near_held_out(
+    copies: Sequence[CatalogueObject], held_out: Mapping[str, ShapeDescriptor], threshold: float
+) -> dict[str, str]:
+    """Copies that are near-copies of a held-out object, each with that object's name."""
+    near: dict[str, str] = {}
+    for item in copies:
+        own = describe(item.mesh)
+        like = [n for n, other in held_out.items() if shape_distance(own, other) < threshold]
+        if like:
+            near[item.name] = min(like)
+    return near
