@@ -27,12 +27,12 @@ from pipeline.geometry.shape import ShapeClass
 from pipeline.labelling.heights import pad_heights
 from pipeline.messages.grasps import GraspOrigin, LabelledGrasps, grasp_batch
 from pipeline.messages.objects import read_objects
-from pipeline.messages.samples import Samples
 from pipeline.messages.scenes import read_scenes
 from pipeline.network.control_inference import ControlPredictor, checked_against
 from pipeline.network.export import export_onnx_bytes
 from pipeline.network.ga_cnn import GaCnn, build_network
 from pipeline.network.inference import predict
+from pipeline.network.samples import Samples
 from pipeline.network.timing import milliseconds_a_grasp
 from pipeline.sensing.depth_noise import disturb
 from pipeline.sensing.sub_cloud import sub_clouds

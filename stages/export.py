@@ -1,40 +1,25 @@
 """`make export`: a run's dataset in a format that other grasp-learning code already loads."""
 
 import json
-from collections.abc import Iterator, Mapping
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 from loguru import logger
 
-from pipeline.artifacts import (
-    from_tensor,
-    open_artifact,
-    package_version,
-    publish_bytes,
-    read_provenance,
-)
+from pipeline.artifacts import package_version, publish_bytes, read_provenance
 from pipeline.artifacts.sharding import listed_shards
 from pipeline.config import load_run_config
 from pipeline.errors import ArtifactError, MachineError
 from pipeline.execution import RunFolder, progress, run_command
-from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.interchange.graspgen import write_graspgen, write_lists
-from pipeline.interchange.object_grasps import ObjectGrasps, base_in_object
 from pipeline.interchange.parquet_shards import write_parquet
-from pipeline.messages.grasps import grasps_of
-from pipeline.messages.objects import read_objects
-from pipeline.messages.samples import Samples, joined_samples, samples_of
-from schemas.softgrip.v1.grasps_pb2 import GraspBatch
-from schemas.softgrip.v1.samples_pb2 import SampleBatch
-from schemas.softgrip.v1.scenes_pb2 import Scene
+from pipeline.interchange.reading import grasps_by_object, read_shard
+from pipeline.network.samples import SPLITS
 from stages.graph import RUNS_DIR
 
-SPLITS = ("train", "val", "test")
 MANIFEST = "manifest.json"
 
 
@@ -96,65 +81,14 @@ def export_grasps(folder: RunFolder, into: Path, wanted: Format, least_quality: 
         write = partial(
             write_acronym, into, least_quality=least_quality, density=density, friction=friction
         )
-    found = grasps_by_object(folder)
+    found = grasps_by_object(
+        folder.artifact("objects"), folder.artifact("scenes"), folder.artifact("grasps")
+    )
     for grasps in progress(found, len(found), f"export: {wanted}", "object"):
         write(grasps)
     if wanted is Format.GRASPGEN:
         write_lists(into, [(grasps.item.name, grasps.split) for grasps in found])
     return sum(map(len, found))
-
-
-def grasps_by_object(folder: RunFolder) -> list[ObjectGrasps]:
-    """Every object that has grasps, in the catalogue's order, with all of them."""
-    objects = read_objects(folder.artifact("objects"))
-    with open_artifact(folder.artifact("scenes")) as artifact:
-        poses = {
-            (scene.scene_id, placed.body_id): from_tensor(placed.world_from_object)
-            for _, scene in artifact.messages(Scene)
-            for placed in scene.objects
-        }
-    parts: dict[str, list[ObjectGrasps]] = {}
-    for shard in listed_shards(folder.artifact("grasps")):
-        with open_artifact(shard) as artifact:
-            for _, message in artifact.messages(GraspBatch):
-                for part in by_body(message, objects, poses):
-                    parts.setdefault(part.item.name, []).append(part)
-    return [joined(parts[name]) for name in objects if name in parts]
-
-
-def by_body(
-    message: GraspBatch,
-    objects: Mapping[str, tuple[CatalogueObject, str]],
-    poses: dict[tuple[str, int], np.ndarray],
-) -> Iterator[ObjectGrasps]:
-    """The grasps of a batch, body by body, in the frame of the body's object."""
-    origin, grasps = grasps_of(message)
-    for body in np.unique(grasps.body_id):
-        rows = np.flatnonzero(grasps.body_id == body)
-        name = origin.object_names[int(grasps.object_index[rows[0]])]
-        item, split = objects[name]
-        world_from_object = poses[origin.scene_id, int(body)]
-        yield ObjectGrasps(
-            item=item,
-            split=split,
-            object_from_base=base_in_object(world_from_object, grasps.world_from_gripper[rows]),
-            quality=grasps.quality[rows],
-            pressure=grasps.pressure[rows],
-            wrench=grasps.wrench[rows],
-            level=np.full(len(rows), origin.level),
-            scene=(origin.scene_id,) * len(rows),
-        )
-
-
-def joined(parts: list[ObjectGrasps]) -> ObjectGrasps:
-    """Several sets of one object's grasps as one."""
-    arrays = ("object_from_base", "quality", "pressure", "wrench", "level")
-    return ObjectGrasps(
-        item=parts[0].item,
-        split=parts[0].split,
-        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in arrays},
-        scene=sum((part.scene for part in parts), ()),
-    )
 
 
 def export_samples(source: Path, into: Path, wanted: Format) -> int:
@@ -174,13 +108,6 @@ def export_samples(source: Path, into: Path, wanted: Format) -> int:
             first += len(samples)
         total += first
     return total
-
-
-def read_shard(shard: Path) -> tuple[Samples, tuple[str, ...]]:
-    """All samples of a shard, and the names their objects point into."""
-    with open_artifact(shard) as artifact:
-        messages = [message for _, message in artifact.messages(SampleBatch)]
-    return joined_samples([samples_of(m) for m in messages]), tuple(messages[0].object_names)
 
 
 def export(

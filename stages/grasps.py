@@ -67,7 +67,7 @@ from stages.graph import GRASPS, inputs_of
 
 TOPIC, PADS_TOPIC = "/grasps", "/pads"
 RECORDED_SCENES = 4
-Picture = tuple[Float[np.ndarray, "h w"], PinholeCamera]  # depth [m], and what took it
+Picture = tuple[Float[np.ndarray, "_ _"], PinholeCamera]  # depth [m], and what took it
 ROUND = 512  # grasps labelled at once: bounds the memory of their rays
 
 

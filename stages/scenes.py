@@ -2,19 +2,17 @@
 
 import shutil
 from collections import Counter, deque
-from collections.abc import Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-import rerun as rr
 
 from pipeline.artifacts import ArtifactWriter, Provenance
 from pipeline.artifacts.sharding import is_current
 from pipeline.clutter.building import build_clutter
+from pipeline.clutter.gaps import gap_mm_by_level
 from pipeline.clutter.levels import level_of
 from pipeline.config import RunConfig
 from pipeline.errors import SceneError
@@ -56,34 +54,44 @@ class SceneJob:
 
 
 def build(stage: StageContext) -> Summary:
-    """Build, settle and render clutter scenes of every level, from each split's objects.
+    """Build, settle and render clutter scenes of every level, from each split's objects."""
+    jobs, clock = scene_jobs(stage), BusyClock()
+    with ArtifactWriter(stage.output, stage.provenance()) as artifact:
+        scenes = make_scenes(stage, jobs, artifact, clock)
+        render_share = clock.share()
+        record(stage, jobs)
+    shutil.rmtree(stage.folder.state("scenes"))
+    return summary(scenes) | {"render_share": render_share}
+
+
+def make_scenes(
+    stage: StageContext, jobs: list[SceneJob], artifact: ArtifactWriter, clock: BusyClock
+) -> list[ClutterScene]:
+    """Every scene into its own file and the artifact; returned without views.
 
     Workers build clutters ahead; this process renders them one after the other, as a driver
     keeps the GPU or all cores busy by itself; a thread writes what is rendered.
     """
-    jobs = scene_jobs(stage)
     missing = [job for job in jobs if not is_current(job.path, job.provenance.key)]
     settled = run_in_order(settled_clutter, missing, stage.workers, stage.executor, AHEAD)
     built = iter(progress(settled, len(missing), "scenes", "scene"))
-    clock = BusyClock()
+    renderer = renderer_of(stage.config).name
     scenes: list[ClutterScene] = []
-    with ExitStack() as files, ThreadPoolExecutor(1) as writer:
-        publication = files.enter_context(Publication.opened(stage, len(jobs)))
+    with ThreadPoolExecutor(1) as writer:
         writes: deque[Future[None]] = deque()
-        for job in jobs:
+        for number, job in enumerate(jobs):
             if job in missing:
                 seen = render(job, next(built), clock)
-                save(job, seen, renderer_of(job.config).name)
+                save(job, seen, renderer)
             else:
                 seen = read_scene(job.path, 0)
-            writes.append(writer.submit(publication.add, seen))
+            writes.append(writer.submit(write_scene, artifact, number, seen, renderer))
             if len(writes) > WAITING_TO_BE_WRITTEN:
                 writes.popleft().result()
             scenes.append(replace(seen, views=()))
         for write in writes:
             write.result()
-    shutil.rmtree(stage.folder.state("scenes"))
-    return summary(scenes) | {"render_share": clock.share()}
+    return scenes
 
 
 def scene_jobs(stage: StageContext) -> list[SceneJob]:
@@ -156,62 +164,25 @@ def renderer_of(config: RunConfig) -> Renderer:
     return new_renderer(config.cameras.renderer, config.scenes)
 
 
-class Publication:
-    """The stage's recording and artifact, to which scenes are added in order."""
-
-    def __init__(
-        self, stage: StageContext, scenes: int, artifact: ArtifactWriter, stream: rr.RecordingStream
-    ) -> None:
-        self._artifact = artifact
-        self._stream = stream
-        self._drawing = stage.drawing
-        items = catalogue(stage.upstream("objects"))
-        self._meshes = {name: item.mesh for name, (item, _) in items.items()}
-        self._nsvr = {name: item.nsvr for name, (item, _) in items.items()}
-        shown = spread(scenes, stage.config.recording.scenes)
-        self._step_of = {index: step for step, index in enumerate(shown)}
-        self._renderer = renderer_of(stage.config).name
-        self._added = 0
-
-    @classmethod
-    @contextmanager
-    def opened(cls, stage: StageContext, scenes: int) -> Iterator["Publication"]:
-        """Both files; when the block ends well the recording appears first, the artifact last."""
-        opening = blueprint(camera_names(stage.config.cameras))
-        with (
-            ArtifactWriter(stage.output, stage.provenance()) as artifact,
-            recording(stage, opening, amid_work=True) as stream,
-        ):
-            yield cls(stage, scenes, artifact, stream)
-
-    def add(self, scene: ClutterScene) -> None:
-        """The next scene."""
-        index, self._added = self._added, self._added + 1
-        if index in self._step_of:
-            with self._drawing.running():
-                show_scene(self._stream, self._step_of[index], scene, self._meshes, self._nsvr)
-        write_scene(self._artifact, index, scene, self._renderer)
+def record(stage: StageContext, jobs: list[SceneJob]) -> None:
+    """The recording: some of the scenes, read from their files."""
+    items = catalogue(stage.upstream("objects"))
+    meshes = {name: item.mesh for name, (item, _) in items.items()}
+    nsvr = {name: item.nsvr for name, (item, _) in items.items()}
+    shown = spread(len(jobs), stage.config.recording.scenes)
+    with recording(stage, blueprint(camera_names(stage.config.cameras))) as stream:
+        for step, index in enumerate(shown):
+            show_scene(stream, step, read_scene(jobs[index].path, 0), meshes, nsvr)
 
 
 def summary(scenes: list[ClutterScene]) -> Summary:
     """The stage's headline figures."""
-    gaps = {
-        str(level): [
-            round(1e3 * float(gap), 3)
-            for scene in scenes
-            if scene.level == level
-            for gap in scene.gaps_m
-        ]
-        for level in sorted({scene.level for scene in scenes})
-    }
     return {
         "scenes": len(scenes),
         "by_split": dict(Counter(scene.split for scene in scenes)),
         "objects_placed": sum(len(scene.objects) for scene in scenes),
         "settle_time_s": round(sum(scene.settle_time_s for scene in scenes), 3),
-        "gap_mm_by_level": {
-            level: {"least": min(found), "greatest": max(found)} for level, found in gaps.items()
-        },
+        "gap_mm_by_level": gap_mm_by_level(scenes),
     }
 
 

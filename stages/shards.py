@@ -19,14 +19,14 @@ from pipeline.errors import ArtifactError
 from pipeline.execution import StageContext, Summary, generator, progress, stage_command
 from pipeline.labelling.balancing import first_proposals, quality_histogram
 from pipeline.messages.grasps import grasps_of
-from pipeline.messages.samples import Samples, joined_samples, sample_batch, samples_of
+from pipeline.messages.samples import sample_batch, samples_of
+from pipeline.network.samples import SPLITS, Samples, joined_samples
 from pipeline.recording.recording import recording
 from pipeline.recording.shards import blueprint, show_samples
 from schemas.softgrip.v1.grasps_pb2 import GraspBatch, ShardEntry
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 from stages.graph import SHARDS, inputs_of
 
-SPLITS = ("train", "val", "test")
 TOPIC = "/samples"
 
 

@@ -14,9 +14,9 @@ from pipeline.artifacts.sharding import shard_entry, shard_path, write_index
 from pipeline.benchmarks.clock import seconds_of
 from pipeline.benchmarks.storage import BATCH, FORMATS, PROVENANCE, write_mcap
 from pipeline.messages.sample_cache import cached_split
-from pipeline.messages.samples import STORED_AS, Samples
+from pipeline.messages.samples import STORED_AS
 from pipeline.network.loading import epoch_batches, load_batches
-from pipeline.network.samples import GraspTensors
+from pipeline.network.samples import GraspTensors, Samples
 
 SHARDS = 4
 REPEATS, EPOCHS = 5, 30

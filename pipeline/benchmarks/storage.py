@@ -14,7 +14,8 @@ import zarr
 
 from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact
 from pipeline.benchmarks.clock import seconds_of
-from pipeline.messages.samples import STORED_AS, Samples, sample_batch, samples_of
+from pipeline.messages.samples import STORED_AS, sample_batch, samples_of
+from pipeline.network.samples import Samples
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 
 BATCH = 256

@@ -10,6 +10,7 @@ from jaxtyping import Float
 
 from pipeline.geometry.mesh import Mesh
 from pipeline.world.raycasting import RayScene
+from pipeline.world.scene import ClutterScene
 
 NO_NEIGHBOUR_M = np.inf
 
@@ -160,3 +161,17 @@ def _faces_in(
     corners = mesh.vertices_m[mesh.faces]
     reaching = (corners.min(axis=1) <= upper_m) & (corners.max(axis=1) >= lower_m)
     return Mesh(mesh.vertices_m, mesh.faces[reaching.all(axis=1)])
+
+
+def gap_mm_by_level(scenes: Sequence[ClutterScene]) -> dict[str, dict[str, float]]:
+    """Level to the least and the greatest gap between neighbours of its scenes, in mm."""
+    gaps = {
+        str(level): [
+            round(1e3 * float(gap), 3)
+            for scene in scenes
+            if scene.level == level
+            for gap in scene.gaps_m
+        ]
+        for level in sorted({scene.level for scene in scenes})
+    }
+    return {level: {"least": min(found), "greatest": max(found)} for level, found in gaps.items()}

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numba
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Integer
 
 from pipeline.world.cameras import PinholeCamera
 
@@ -30,7 +30,7 @@ class DepthPicture:
 
     depth_m: Float[np.ndarray, "h w"]
     camera: PinholeCamera
-    instances: Int[np.ndarray, "h w"] | None = None
+    instances: Integer[np.ndarray, "h w"] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +43,7 @@ class Cloud:
     def __len__(self) -> int:
         return len(self.points_m)
 
-    def take(self, chosen: Bool[np.ndarray, " n"] | Int[np.ndarray, " k"]) -> "Cloud":
+    def take(self, chosen: Bool[np.ndarray, " n"] | Integer[np.ndarray, " k"]) -> "Cloud":
         """Some of the points."""
         return Cloud(self.points_m[chosen], self.eye_m[chosen])
 

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Integer
 
 from pipeline.control.cloud import TABLE_CLEARANCE_M, DepthPicture
 from pipeline.geometry.transforms import invert, transform_points
@@ -107,6 +107,6 @@ def _within(
     return np.asarray(inside)
 
 
-def _instances(picture: DepthPicture) -> Int[np.ndarray, "h w"]:
+def _instances(picture: DepthPicture) -> Integer[np.ndarray, "h w"]:
     assert picture.instances is not None
     return picture.instances

@@ -4,6 +4,7 @@ The gripper's base frame of these formats has its +z along the approach, into th
 its +z out of it. Both have their origin at the pad's centre where it first touches.
 """
 
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from jaxtyping import Bool, Float, Int
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.transforms import invert
+from pipeline.messages.grasps import GraspOrigin, LabelledGrasps
 
 # Half a turn about x: its own inverse.
 GCS_FROM_BASE = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -49,6 +51,55 @@ def base_in_object(
 ) -> Float[np.ndarray, "n 4 4"]:
     """Poses of GCS in the world → poses of the formats' gripper base in the object's frame."""
     return np.asarray(invert(world_from_object) @ world_from_gripper @ GCS_FROM_BASE)
+
+
+def split_by_body(
+    origin: GraspOrigin,
+    grasps: LabelledGrasps,
+    objects: Mapping[str, tuple[CatalogueObject, str]],
+    poses: Mapping[tuple[str, int], Float[np.ndarray, "4 4"]],
+) -> Iterator[ObjectGrasps]:
+    """The grasps of a batch, body by body, in the frame of the body's object.
+
+    Parameters
+    ----------
+    origin, grasps
+        A batch: its scene, and its grasps in the world.
+    objects
+        Name of an object to the object and its split.
+    poses
+        Scene and body id to ``world_from_object``.
+
+    Yields
+    ------
+    The grasps of each body that has any, in the order of body ids.
+    """
+    for body in np.unique(grasps.body_id):
+        rows = np.flatnonzero(grasps.body_id == body)
+        name = origin.object_names[int(grasps.object_index[rows[0]])]
+        item, split = objects[name]
+        world_from_object = poses[origin.scene_id, int(body)]
+        yield ObjectGrasps(
+            item=item,
+            split=split,
+            object_from_base=base_in_object(world_from_object, grasps.world_from_gripper[rows]),
+            quality=grasps.quality[rows],
+            pressure=grasps.pressure[rows],
+            wrench=grasps.wrench[rows],
+            level=np.full(len(rows), origin.level),
+            scene=(origin.scene_id,) * len(rows),
+        )
+
+
+def joined_grasps(parts: Sequence[ObjectGrasps]) -> ObjectGrasps:
+    """Several sets of one object's grasps as one, in order; at least one."""
+    arrays = ("object_from_base", "quality", "pressure", "wrench", "level")
+    return ObjectGrasps(
+        item=parts[0].item,
+        split=parts[0].split,
+        **{name: np.concatenate([getattr(part, name) for part in parts]) for name in arrays},
+        scene=sum((part.scene for part in parts), ()),
+    )
 
 
 def obj_text(mesh: Mesh) -> str:

@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 
 from pipeline.artifacts.publishing import published
 from pipeline.geometry.shape import ShapeClass
-from pipeline.messages.samples import Samples
+from pipeline.network.samples import Samples
 
 CLASSES = tuple(str(kind) for kind in ShapeClass)
 ROW_GROUP = 1024  # samples read at once

@@ -7,7 +7,7 @@ import webdataset
 
 from pipeline.artifacts.publishing import published
 from pipeline.geometry.shape import ShapeClass
-from pipeline.messages.samples import Samples
+from pipeline.network.samples import Samples
 
 CLASSES = tuple(str(kind) for kind in ShapeClass)
 

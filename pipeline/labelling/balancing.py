@@ -7,7 +7,7 @@ subset whose histogram is nearer to flat. Both leave their mark in the sample
 """
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, Integer
 
 from pipeline.labelling.sampling import Proposal
 
@@ -57,7 +57,7 @@ def flattened(
 
 
 def first_proposals(
-    proposal: Int[np.ndarray, " n"], keep_probability: Float[np.ndarray, " n"]
+    proposal: Integer[np.ndarray, " n"], keep_probability: Float[np.ndarray, " n"]
 ) -> Float[np.ndarray, " n"]:
     """How many grasps of the first round each kept grasp stands for.
 

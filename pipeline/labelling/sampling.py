@@ -44,7 +44,7 @@ class VisibleSurface:
     eye_m: Float[np.ndarray, " 3"]
     whole: Bool[np.ndarray, " n"]
 
-    def of_body(self, body_id: int) -> "VisibleSurface":
+    def of_body(self, body_id: int | np.integer) -> "VisibleSurface":
         """The part that lies on one object."""
         mine = self.body_id == body_id
         return replace(

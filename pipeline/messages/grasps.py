@@ -3,7 +3,7 @@
 from dataclasses import dataclass, fields
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, UInt8
+from jaxtyping import Bool, Float, Integer
 
 from pipeline.artifacts.tensors import set_tensors, tensors_of
 from pipeline.errors import ContentError
@@ -63,8 +63,8 @@ class LabelledGrasps:
     pictures : (n,) how many pictures the cloud was cut from: one, or all of the scene.
     """
 
-    object_index: Int[np.ndarray, " n"]
-    body_id: Int[np.ndarray, " n"]
+    object_index: Integer[np.ndarray, " n"]
+    body_id: Integer[np.ndarray, " n"]
     world_from_gripper: Float[np.ndarray, "n 4 4"]
     quality: Float[np.ndarray, " n"]
     pressure: Float[np.ndarray, " n"]
@@ -72,15 +72,15 @@ class LabelledGrasps:
     limit_slack: Float[np.ndarray, "n 8"]
     weight_summary: Float[np.ndarray, "n 3"]
     contact_mask: Bool[np.ndarray, "n v"]
-    status: UInt8[np.ndarray, " n"]
-    iterations: Int[np.ndarray, " n"]
+    status: Integer[np.ndarray, " n"]
+    iterations: Integer[np.ndarray, " n"]
     tilt_rad: Float[np.ndarray, " n"]
-    proposal: Int[np.ndarray, " n"]
+    proposal: Integer[np.ndarray, " n"]
     keep_probability: Float[np.ndarray, " n"]
     cloud: Float[np.ndarray, "n g g 3"]
     cloud_mask: Bool[np.ndarray, "n g g"]
     touch_height_m: Float[np.ndarray, " n"]
-    pictures: Int[np.ndarray, " n"]
+    pictures: Integer[np.ndarray, " n"]
 
     def __len__(self) -> int:
         return len(self.quality)
@@ -160,7 +160,7 @@ class ShownPads:
     pressure : p w_j of each triangle, 0 where it is not in contact.
     """
 
-    grasp: Int[np.ndarray, " k"]
+    grasp: Integer[np.ndarray, " k"]
     height_m: Float[np.ndarray, "k v"]
     pressure: Float[np.ndarray, "k t"]
 

@@ -19,7 +19,8 @@ from pipeline.artifacts.publishing import file_sha256, scratch_beside, write_err
 from pipeline.artifacts.reading import open_artifact
 from pipeline.artifacts.sharding import listed_shards, read_index
 from pipeline.errors import ArtifactError
-from pipeline.messages.samples import STORED_AS, Samples, samples_of
+from pipeline.messages.samples import STORED_AS, samples_of
+from pipeline.network.samples import Samples
 from schemas.softgrip.v1.grasps_pb2 import ShardEntry
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 

@@ -1,12 +1,9 @@
 """Training samples ↔ softgrip.v1.SampleBatch."""
 
 import math
-from dataclasses import dataclass, fields
-
-import numpy as np
-from jaxtyping import Bool, Float, Int
 
 from pipeline.artifacts.tensors import set_tensors, tensors_of
+from pipeline.network.samples import Samples
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 
 STORED_AS = {
@@ -28,44 +25,6 @@ SHAPES = {
 }
 # What the fields hold that v1 did not have from the start.
 UNLESS_THERE = {"proposal_weight": math.nan, "pictures": 1}
-
-
-@dataclass(frozen=True)
-class Samples:
-    """What training reads; arrays of one length n.
-
-    cloud, cloud_mask : (n, g, g, 3) and (n, g, g), units of r_G, origin at the contact.
-    quality, pressure : (n,) q and p. shape_class : (n,) 0 basic, 1 typical, 2 complex.
-    object_index : (n,) into the catalogue's names, kept beside.
-    proposal_weight : (n,) how many grasps of the first round, drawn as S-1.04 - S-1.06 say and
-    before labels were balanced, a sample stands for; 0 for one proposed near a rare label. NaN
-    where the shards, of an older program, do not say.
-    pictures : (n,) how many pictures the cloud was cut from.
-    """
-
-    cloud: Float[np.ndarray, "n g g 3"]
-    cloud_mask: Bool[np.ndarray, "n g g"]
-    quality: Float[np.ndarray, " n"]
-    object_index: Int[np.ndarray, " n"]
-    shape_class: Int[np.ndarray, " n"]
-    level: Int[np.ndarray, " n"]
-    pressure: Float[np.ndarray, " n"]
-    proposal_weight: Float[np.ndarray, " n"]
-    pictures: Int[np.ndarray, " n"]
-
-    def __len__(self) -> int:
-        return len(self.quality)
-
-    def take(self, chosen: Int[np.ndarray, " k"] | slice) -> "Samples":
-        """Those at the given indices."""
-        return Samples(*(getattr(self, f.name)[chosen] for f in fields(self)))
-
-
-def joined_samples(parts: list[Samples]) -> Samples:
-    """Several sets as one, in order; at least one."""
-    return Samples(
-        *(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Samples))
-    )
 
 
 def sample_batch(samples: Samples, object_names: tuple[str, ...]) -> SampleBatch:

@@ -1,33 +1,19 @@
-"""A sweep's networks → softgrip.v1.SweepNetwork."""
+"""A sweep's networks and budget ↔ softgrip.v1.SweepNetwork and SweepBudget."""
 
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
+
+from google.protobuf.json_format import MessageToDict
 
 from pipeline.artifacts.reading import open_artifact
+from pipeline.config import RunConfig
+from pipeline.config.learning import NetworkConfig
 from pipeline.messages.training import epoch_message
-from pipeline.network.family import Member
+from pipeline.network.baselines import mean_predictor_mae
+from pipeline.network.family import VARIANTS, Member, MemberFigures, chosen_member
+from pipeline.network.samples import Samples
 from pipeline.network.training import TrainedNetwork
-from schemas.softgrip.v1.training_pb2 import SweepNetwork
-
-
-@dataclass(frozen=True)
-class MemberFigures:
-    """One member after its training; errors are mean |q-hat - q|.
-
-    val_mae, val_mae_spread : of the best epoch, and the standard error of that mean.
-    test_mae_single, test_mae_averaged : of one prediction a grasp, and of the mean over its
-    symmetries; test_mae : averaged where the member was trained with symmetries, else single.
-    by_class : class name → test error. parameters, multiply_adds : its size, its cost a grasp.
-    """
-
-    val_mae: float
-    val_mae_spread: float
-    test_mae: float
-    test_mae_single: float
-    test_mae_averaged: float
-    by_class: dict[str, float]
-    parameters: int
-    multiply_adds: int
+from schemas.softgrip.v1.training_pb2 import SweepBudget, SweepNetwork
 
 
 def sweep_message(member: Member, trained: TrainedNetwork, figures: MemberFigures) -> SweepNetwork:
@@ -55,3 +41,75 @@ def read_sweep(path: Path) -> list[SweepNetwork]:
     """Every network of a sweep's artifact, in its order."""
     with open_artifact(path) as artifact:
         return [message for _, message in artifact.messages(SweepNetwork)]
+
+
+def mark_networks(networks: list[SweepNetwork], of_run: NetworkConfig) -> None:
+    """Set ``of_run`` where the size is the run's, and ``chosen`` on one of the family."""
+    for network in networks:
+        size = (network.layers, tuple(network.channels))
+        network.of_run = size == (of_run.layers, of_run.channels)
+    family = [network for network in networks if network.group == "family"]
+    chosen = chosen_member(
+        [network.val_mae for network in family],
+        [network.val_mae_spread for network in family],
+        [network.multiply_adds for network in family],
+    )
+    family[chosen].chosen = True
+
+
+def network_config_of(network: SweepNetwork) -> NetworkConfig:
+    """The make of a network of the sweep."""
+    attention = "none" if network.variant == "no attention" else "cbam"
+    channels = tuple(network.channels)
+    return NetworkConfig.model_validate(
+        {"layers": network.layers, "channels": channels, "attention": attention}
+    )
+
+
+def budget_message(config: RunConfig, given: dict[str, Samples]) -> SweepBudget:
+    """What every member was given: split to samples."""
+    return SweepBudget(
+        train_samples=len(given["train"]),
+        val_samples=len(given["val"]),
+        test_samples=len(given["test"]),
+        epochs=config.sweep.epochs,
+        batch_size=config.sweep.batch_size,
+        mean_predictor_mae=mean_predictor_mae(given["train"].quality, given["test"].quality),
+    )
+
+
+def sweep_summary(
+    networks: list[SweepNetwork], times_ms: list[float], budget: SweepBudget
+) -> dict[str, Any]:
+    """The study's headline figures; ``times_ms`` is each network's time a grasp."""
+    rows = [
+        {**plain(network), "ms_a_grasp": time_ms}
+        for network, time_ms in zip(networks, times_ms, strict=True)
+    ]
+    ablation = {
+        variant: {
+            name: [
+                getattr(n, name) for n in networks if (n.group, n.variant) == ("ablation", variant)
+            ]
+            for name in ("test_mae_single", "test_mae_averaged")
+        }
+        for variant in VARIANTS
+    }
+    return {
+        "chosen": next(row for row in rows if row["chosen"]),
+        "ablation": ablation,
+        "budget": plain(budget),
+        "networks": rows,
+    }
+
+
+def plain(message: SweepNetwork | SweepBudget) -> dict[str, Any]:
+    """A message's values by name, those at their default too; curves stay in the artifact."""
+    fields = MessageToDict(
+        message, preserving_proto_field_name=True, always_print_fields_with_no_presence=True
+    )
+    return {
+        name: getattr(message, name) if isinstance(value, str | float | int) else value
+        for name, value in fields.items()
+        if name != "curve"
+    }

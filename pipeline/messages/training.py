@@ -2,54 +2,18 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
 
 from pipeline.artifacts.tensors import to_tensor
+from pipeline.network.held_out import TestFigures
 from pipeline.network.resuming import EpochMetrics
 from pipeline.network.training import TrainedNetwork
 from schemas.softgrip.v1.training_pb2 import Epoch, TrainingResult
 
 CHECKPOINT = "ga_cnn.safetensors"
 EXPORT = "ga_cnn.onnx"
-
-
-@dataclass(frozen=True)
-class TestFigures:
-    """The network on held-out objects.
-
-    quality, predicted : (n,) q and q-hat. mae : mean |q-hat - q| of Supplement IV.
-    mae_single : the same without averaging over the symmetries. count_by_class : samples.
-    mae_as_proposed, mean_predictor_mae_as_proposed : over grasps as the first round draws them
-    (`Samples.proposal_weight`), where labels are not balanced; None where that is unknown.
-    train_count, val_count : samples that the network learned from and was chosen by.
-    mean_predictor_mae, seal_ratio_mae : of the baselines. by_class : class name → error.
-    by_pictures : "1 picture", "3 pictures", ... that clouds were cut from → error, samples.
-    first_proposals : samples of the first round, those that ``mae_as_proposed`` is over.
-    by_tenth : error by tenth of q, None where empty.
-    calibration : by tenth of q-hat: mean q-hat, mean q (None where empty), count.
-    """
-
-    __test__ = False  # not a test case, whatever its name
-
-    quality: Float[np.ndarray, " n"]
-    predicted: Float[np.ndarray, " n"]
-    mae: float
-    mae_single: float
-    mae_as_proposed: float | None
-    mean_predictor_mae: float
-    mean_predictor_mae_as_proposed: float | None
-    seal_ratio_mae: float
-    by_class: dict[str, float]
-    by_pictures: dict[str, tuple[float, int]]
-    first_proposals: int
-    count_by_class: dict[str, int]
-    by_tenth: Sequence[float | None]
-    calibration: Sequence[tuple[float | None, float | None, int]]
-    train_count: int
-    val_count: int
 
 
 def epoch_message(metrics: EpochMetrics) -> Epoch:

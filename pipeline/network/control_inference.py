@@ -1,6 +1,7 @@
 """Quality for control: an exported GA-CNN, run on the CPU by OpenVINO."""
 
 import sys
+from typing import Any
 
 import numpy as np
 import torch
@@ -128,6 +129,9 @@ def _compiled(data: bytes, input_shape: tuple[int, ...], threads: int) -> openvi
     return compiled
 
 
-def _take_quality(request: openvino.InferRequest, into: Float[np.ndarray, " n"]) -> None:
-    """Keep a part's quality, without that of its padding."""
+def _take_quality(request: Any, into: Float[np.ndarray, " n"]) -> None:
+    """Keep a part's quality, without that of its padding.
+
+    ``request`` is an InferRequest of OpenVINO's inner kind, which has no public name.
+    """
     into[:] = request.get_output_tensor(0).data[: len(into)]

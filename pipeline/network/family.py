@@ -16,11 +16,17 @@ from typing import Literal
 
 import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch.utils.flop_counter import FlopCounterMode
 
-from pipeline.config.learning import NetworkConfig, SweepConfig
-from pipeline.network.ga_cnn import GaCnn, build_network
+from pipeline.config.learning import NetworkConfig, SweepConfig, TrainConfig
+from pipeline.network.figures import error_by_group, mean_absolute_error
+from pipeline.network.ga_cnn import GaCnn, build_network, parameter_count
+from pipeline.network.held_out import CLASSES
+from pipeline.network.inference import predict
+from pipeline.network.samples import Samples
+from pipeline.network.timing import milliseconds_a_grasp
+from pipeline.network.training import TrainedNetwork
 
 Variant = Literal["ga-cnn", "no attention", "no augmentation"]
 VARIANTS: tuple[Variant, ...] = ("ga-cnn", "no attention", "no augmentation")
@@ -53,6 +59,35 @@ class Member:
         return f"{self.group}-{variant}-{self.network.layers}-{channels}-{self.seed}"
 
 
+@dataclass(frozen=True)
+class MemberFigures:
+    """One member after its training; errors are mean |q̂ − q|.
+
+    Attributes
+    ----------
+    val_mae, val_mae_spread
+        Of the best epoch, and the standard error of that mean.
+    test_mae
+        ``test_mae_averaged`` where the member was trained with symmetries, else
+        ``test_mae_single``.
+    test_mae_single, test_mae_averaged
+        Of one prediction a grasp, and of the mean over its symmetries.
+    by_class
+        Name of a shape class to test error.
+    parameters, multiply_adds
+        Its size, and its cost a grasp.
+    """
+
+    val_mae: float
+    val_mae_spread: float
+    test_mae: float
+    test_mae_single: float
+    test_mae_averaged: float
+    by_class: dict[str, float]
+    parameters: int
+    multiply_adds: int
+
+
 def members(sweep: SweepConfig, of_run: NetworkConfig, seed: int) -> list[Member]:
     """The family, depth by depth within each channel set, then the ablation of ``of_run``.
 
@@ -80,6 +115,79 @@ def members(sweep: SweepConfig, of_run: NetworkConfig, seed: int) -> list[Member
     for member in (*family, *ablation):
         build_network(member.network, seed=0)  # said before the first training, not after hours
     return [*family, *ablation]
+
+
+def budgeted(sweep: SweepConfig, split: str, samples: Samples) -> Samples:
+    """What every member gets of a split ("train", "val" or "test"): its first samples.
+
+    A split is shuffled, so that its first samples are a fair part of it.
+    """
+    wanted = sweep.samples if split == "train" else sweep.held_out_samples
+    return samples.take(slice(0, wanted))
+
+
+def member_training(config: TrainConfig, sweep: SweepConfig, member: Member) -> TrainConfig:
+    """The run's training cut to the budget, on one thread: members train side by side."""
+    cut = {"epochs": sweep.epochs, "patience_epochs": sweep.epochs, "batch_size": sweep.batch_size}
+    own = {"threads": 1, "augment": member.augment}
+    return config.model_copy(update={**cut, **own})
+
+
+def measure_member(
+    member: Member, trained: TrainedNetwork, config: TrainConfig, val: Samples, test: Samples
+) -> MemberFigures:
+    """Error and cost of a trained member.
+
+    Parameters
+    ----------
+    member, trained
+        What was trained, and what came of it.
+    config
+        Batch size and threads to predict with.
+    val, test
+        Held-out samples: the spread of the validation error is of the first, the test errors of
+        the second.
+
+    Returns
+    -------
+    Its figures.
+    """
+
+    def predicted(samples: Samples, averaged: bool) -> Float[np.ndarray, " n"]:
+        size, threads = config.batch_size, config.threads
+        cloud, mask = samples.cloud, samples.cloud_mask
+        return predict(trained.network, cloud, mask, size, threads, averaged)
+
+    single, averaged = predicted(test, averaged=False), predicted(test, averaged=True)
+    usual = averaged if member.augment else single
+    return MemberFigures(
+        val_mae=trained.val_mae,
+        val_mae_spread=standard_error(np.abs(predicted(val, averaged=False) - val.quality)),
+        test_mae=mean_absolute_error(usual, test.quality),
+        test_mae_single=mean_absolute_error(single, test.quality),
+        test_mae_averaged=mean_absolute_error(averaged, test.quality),
+        by_class=error_by_group(usual, test.quality, CLASSES[test.shape_class]),
+        parameters=parameter_count(trained.network),
+        multiply_adds=multiply_adds(trained.network),
+    )
+
+
+def time_network_ms(config: NetworkConfig, test: Samples, batch: int, threads: int) -> float:
+    """Milliseconds a grasp of a network of this make on the CPU, in batches of ``batch``.
+
+    Its weights are drawn at random, as they change no time.
+    """
+    network = build_network(config, seed=0)
+
+    def ask(
+        cloud: Float[np.ndarray, "n h w 3"], mask: Bool[np.ndarray, "n h w"]
+    ) -> Float[np.ndarray, " n"]:
+        return predict(network, cloud, mask, len(cloud), threads, average_symmetries=False)
+
+    (time,) = milliseconds_a_grasp(
+        ask, test.cloud[:batch], test.cloud_mask[:batch], (batch,)
+    ).values()
+    return time
 
 
 def multiply_adds(network: GaCnn) -> int:

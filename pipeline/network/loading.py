@@ -32,14 +32,14 @@ def batch_count(samples: int, batch_size: int) -> int:
 
 def epoch_batches(
     samples: int, batch_size: int, rng: np.random.Generator
-) -> list[Int[np.ndarray, " b"]]:
+) -> list[Int[np.ndarray, " _"]]:
     """Indices of each batch of an epoch: a permutation cut into parts of nearly equal size."""
     return np.array_split(rng.permutation(samples), batch_count(samples, batch_size))
 
 
 def part_of_rank(
-    batches: list[Int[np.ndarray, " b"]], rank: int, ranks: int
-) -> list[Int[np.ndarray, " part"]]:
+    batches: list[Int[np.ndarray, " _"]], rank: int, ranks: int
+) -> list[Int[np.ndarray, " _"]]:
     """What one of ``ranks`` processes reads of each batch, in the order of the file.
 
     Raises
@@ -58,7 +58,7 @@ def part_of_rank(
 class SampleBatches(Dataset[RawBatch]):
     """Item k: indices, clouds, masks and qualities of the samples ``batches[k]``."""
 
-    def __init__(self, samples: GraspTensors, batches: list[Int[np.ndarray, " b"]]) -> None:
+    def __init__(self, samples: GraspTensors, batches: list[Int[np.ndarray, " _"]]) -> None:
         # Plain arrays over the same memory: indexing a np.memmap itself costs more.
         self._cloud, self._mask = np.asarray(samples.cloud), np.asarray(samples.mask)
         self._quality = np.asarray(samples.quality, dtype=np.float32)
@@ -78,7 +78,7 @@ class SampleBatches(Dataset[RawBatch]):
 
 
 def load_batches(
-    samples: GraspTensors, batches: list[Int[np.ndarray, " b"]], workers: int, pinned: bool
+    samples: GraspTensors, batches: list[Int[np.ndarray, " _"]], workers: int, pinned: bool
 ) -> Iterator[RawBatch]:
     """The batches in order, read by this process or ahead of it by ``workers`` others.
 

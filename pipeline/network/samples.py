@@ -1,13 +1,14 @@
-"""What the network learns from: arrays of clouds, masks and qualities."""
+"""What training reads of a dataset, and the part of it that the network learns from."""
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Integer
 
 from pipeline.errors import ArtifactError
 
+SPLITS = ("train", "val", "test")
 _REMEDY = "Make the shards again."
 # So many samples show which way the grid lies.
 _ORIENTATION_SAMPLES = 64
@@ -63,6 +64,49 @@ class GraspTensors:
             digest.update(f"{array.dtype.str}{array.shape}".encode())
             digest.update(np.ascontiguousarray(array).data)
         return digest.hexdigest()
+
+
+@dataclass(frozen=True)
+class Samples:
+    """What training reads; arrays of one length n.
+
+    cloud, cloud_mask : (n, g, g, 3) and (n, g, g), units of r_G, origin at the contact.
+    quality, pressure : (n,) q and p. shape_class : (n,) 0 basic, 1 typical, 2 complex.
+    object_index : (n,) into the catalogue's names, kept beside.
+    proposal_weight : (n,) how many grasps of the first round, drawn as S-1.04 - S-1.06 say and
+    before labels were balanced, a sample stands for; 0 for one proposed near a rare label. NaN
+    where the shards, of an older program, do not say.
+    pictures : (n,) how many pictures the cloud was cut from.
+    """
+
+    cloud: Float[np.ndarray, "n g g 3"]
+    cloud_mask: Bool[np.ndarray, "n g g"]
+    quality: Float[np.ndarray, " n"]
+    object_index: Integer[np.ndarray, " n"]
+    shape_class: Integer[np.ndarray, " n"]
+    level: Integer[np.ndarray, " n"]
+    pressure: Float[np.ndarray, " n"]
+    proposal_weight: Float[np.ndarray, " n"]
+    pictures: Integer[np.ndarray, " n"]
+
+    def __len__(self) -> int:
+        return len(self.quality)
+
+    @property
+    def tensors(self) -> GraspTensors:
+        """The part that the network learns from."""
+        return GraspTensors(self.cloud, self.cloud_mask, self.quality)
+
+    def take(self, chosen: Integer[np.ndarray, " k"] | slice) -> "Samples":
+        """Those at the given indices."""
+        return Samples(*(getattr(self, f.name)[chosen] for f in fields(self)))
+
+
+def joined_samples(parts: list[Samples]) -> Samples:
+    """Several sets as one, in order; at least one."""
+    return Samples(
+        *(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Samples))
+    )
 
 
 def _check_orientation(

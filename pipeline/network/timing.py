@@ -6,6 +6,10 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from jaxtyping import Bool, Float
 
+from pipeline.network.control_inference import ControlPredictor
+from pipeline.network.ga_cnn import GaCnn
+from pipeline.network.inference import predict
+
 Predict = Callable[
     [Float[np.ndarray, "n h w 3"], Bool[np.ndarray, "n h w"]], Float[np.ndarray, " n"]
 ]
@@ -42,3 +46,40 @@ def milliseconds_a_grasp(
             times.append(time.perf_counter() - started)
         figures[str(size)] = 1e3 * float(np.median(times)) / size
     return figures
+
+
+def runtimes_ms_a_grasp(
+    network: GaCnn,
+    exported: ControlPredictor,
+    cloud: Float[np.ndarray, "n h w 3"],
+    mask: Bool[np.ndarray, "n h w"],
+    threads: int,
+    batches: Sequence[int] = BATCHES,
+    seconds: float = _SECONDS,
+) -> dict[str, dict[str, float]]:
+    """Runtime to batch size to milliseconds a grasp on the CPU, one prediction a grasp.
+
+    Parameters
+    ----------
+    network
+        As it was trained; runs on ``threads`` threads of PyTorch.
+    exported
+        The same network for OpenVINO, on the threads that it was opened with.
+    cloud, mask
+        Grasps to predict; repeated where a batch is larger.
+    threads
+        Threads of PyTorch.
+    batches, seconds
+        See `milliseconds_a_grasp`.
+    """
+
+    def trained(
+        clouds: Float[np.ndarray, "b h w 3"], masks: Bool[np.ndarray, "b h w"]
+    ) -> Float[np.ndarray, " b"]:
+        return predict(network, clouds, masks, len(clouds), threads, average_symmetries=False)
+
+    runtimes: dict[str, Predict] = {"openvino": exported.predict, "pytorch": trained}
+    return {
+        name: milliseconds_a_grasp(run, cloud, mask, batches, seconds)
+        for name, run in runtimes.items()
+    }

@@ -7,7 +7,7 @@ from functools import lru_cache
 import numba
 import numpy as np
 import sapien
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, Integer
 
 from pipeline.geometry.mesh import Mesh
 
@@ -109,7 +109,7 @@ def _corner_normals(
 @lru_cache(maxsize=256)
 def _shading_arrays(
     mesh: Mesh,
-) -> tuple[Float[np.ndarray, "k 3"], Int[np.ndarray, "m 3"], Float[np.ndarray, "k 3"]]:
+) -> tuple[Float[np.ndarray, "k 3"], Integer[np.ndarray, "m 3"], Float[np.ndarray, "k 3"]]:
     """Vertices, faces and normals with each face's corners its own, ready for upload."""
     vertices = mesh.vertices_m[mesh.faces].reshape(-1, 3).astype(np.float32)
     normals = crease_normals(mesh).reshape(-1, 3).astype(np.float32)

@@ -19,8 +19,7 @@ import errno
 import os
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
-from functools import partial
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Protocol
 
@@ -70,35 +69,28 @@ class Recorded(Protocol):
 
 
 @contextmanager
-def recording(
-    stage: Recorded, blueprint: rrb.Blueprint, amid_work: bool = False
-) -> Iterator[rr.RecordingStream]:
+def recording(stage: Recorded, blueprint: rrb.Blueprint) -> Iterator[rr.RecordingStream]:
     """Open the recording of a stage; it appears at ``stage.recording`` when the block ends well.
 
     Parameters
     ----------
-    stage : its name, the recording's place and identity, and the stopwatch to run.
+    stage : its name, the recording's place and identity, and the stopwatch that runs meanwhile.
     blueprint : how the viewer lays the recording out.
-    amid_work : the block holds the stage's work too, and what it logs runs under
-        ``stage.drawing`` itself; else the whole block counts as recording.
 
     Raises
     ------
     OSError : the disk is full.
     """
     path = stage.recording
-    held = partial(stage.drawing.running, whole_process=not amid_work)
-    with published(path) as scratch:
-        with held():
-            _check_room(scratch)
-            name = f"{APPLICATION}_{stage.name}"
-            stream = rr.RecordingStream(name, recording_id=stage.recording_id)
-            stream.save(scratch, default_blueprint=blueprint)
+    with published(path) as scratch, stage.drawing.running(whole_process=True):
+        _check_room(scratch)
+        name = f"{APPLICATION}_{stage.name}"
+        stream = rr.RecordingStream(name, recording_id=stage.recording_id)
+        stream.save(scratch, default_blueprint=blueprint)
         try:
-            with nullcontext() if amid_work else held():
-                yield stream
+            yield stream
         finally:
-            with held(), _disk_full_told(scratch):
+            with _disk_full_told(scratch):
                 stream.flush()
                 stream.disconnect()
     _warn_if_large(path)

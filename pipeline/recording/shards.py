@@ -5,7 +5,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from pipeline.labelling.balancing import quality_histogram
-from pipeline.messages.samples import Samples
+from pipeline.network.samples import Samples
 from pipeline.recording import colours
 from pipeline.recording.recording import looking, spread, time_panel
 

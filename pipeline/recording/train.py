@@ -6,9 +6,9 @@ import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pipeline.messages.samples import Samples
-from pipeline.messages.training import TestFigures
+from pipeline.network.held_out import TestFigures
 from pipeline.network.resuming import EpochMetrics
+from pipeline.network.samples import Samples
 from pipeline.recording import colours
 from pipeline.recording.recording import looking, name_curve, step, time_panel
 

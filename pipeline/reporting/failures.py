@@ -1,27 +1,68 @@
-"""Pictures of failed attempts: the clutter at its worst moment, with the pad where it was."""
+"""Failed attempts: what a report says of them, and a picture of each at its worst moment."""
 
 import io
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import trimesh
 from jaxtyping import Float
 from PIL import Image
 
+from pipeline.artifacts import open_artifact
 from pipeline.artifacts.tensors import from_tensor
-from pipeline.config import ScenesConfig, StaticCameraConfig
+from pipeline.config import RunConfig, ScenesConfig, StaticCameraConfig
+from pipeline.execution import RunFolder
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.mesh import Mesh
+from pipeline.messages.objects import read_objects
+from pipeline.reporting.facts import read_failures
 from pipeline.sensing.ray_rendering import RayRenderer
 from pipeline.world.cameras import camera_at
 from pipeline.world.scene import PlacedObject
 from schemas.softgrip.v1.evaluation_pb2 import Attempt
+from schemas.softgrip.v1.scenes_pb2 import Scene
 
 CAMERA = StaticCameraConfig(width_px=400, height_px=300, vertical_fov_rad=0.7, sensor="ideal")
 DISTANCE_M, ELEVATION_RAD, AZIMUTH_RAD = 0.5, 0.75, -0.9
 PAD = "pad"
 PAD_THICKNESS_M = 0.006
+
+
+def failures_of(
+    folder: RunFolder, config: RunConfig, policy: str, at_most: int
+) -> tuple[list[dict[str, Any]], dict[str, bytes]]:
+    """Some failed attempts of a policy: a row each, and name to JPEG of those that moved.
+
+    A row's ``picture`` is the name of its picture, empty where nothing moved.
+    """
+    objects = {name: item for name, (item, _) in read_objects(folder.artifact("objects")).items()}
+    with open_artifact(folder.artifact("scenes")) as artifact:
+        names = {
+            scene.scene_id: tuple(placed.object_name for placed in scene.objects)
+            for _, scene in artifact.messages(Scene)
+        }
+    rows, pictures = [], {}
+    for number, attempt in enumerate(read_failures(folder.artifact("evaluate"), policy, at_most)):
+        bodies, radius = names[attempt.scene_id], config.gripper.pad.radius_m
+        jpeg = failure_picture(attempt, bodies, objects, config.scenes, radius)
+        name = f"failure-{number}.jpg" if jpeg else ""
+        if jpeg:
+            pictures[name] = jpeg
+        rows.append(
+            {
+                "cause": attempt.cause,
+                "scene_id": attempt.scene_id,
+                "number": attempt.attempt,
+                "target": attempt.target or "nothing",
+                "predicted": attempt.predicted_quality,
+                "reached": attempt.reached_quality,
+                "pressure": attempt.seal_pressure,
+                "picture": name,
+            }
+        )
+    return rows, pictures
 
 
 def failure_picture(

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numba
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Integer
 
 from pipeline.geometry.transforms import invert, transform_points
 from pipeline.sensing.depth_noise import disturb
@@ -22,7 +22,7 @@ def measured(
     scene: PosedScene,
     opaque: PosedScene | None,
     rng: np.random.Generator | None,
-) -> tuple[Float[np.ndarray, "h w"], Int[np.ndarray, "h w"]]:
+) -> tuple[Float[np.ndarray, "h w"], Integer[np.ndarray, "h w"]]:
     """The depth image, 0 where nothing is measured, and the body that each pixel shows.
 
     Bodies are told by their ids, transparent or not; 0 is the table and nothing.

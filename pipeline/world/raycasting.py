@@ -96,7 +96,9 @@ class RayScene:
         return weights
 
     def cast(
-        self, origins_m: Float[np.ndarray, "n 3"], directions: Float[np.ndarray, "n 3"]
+        self,
+        origins_m: Float[np.ndarray, "n 3"],
+        directions: Float[np.ndarray, "n 3"] | Float[np.ndarray, " 3"],
     ) -> RayHits:
         """First hit of each ray, on either side of a triangle.
 

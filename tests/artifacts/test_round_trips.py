@@ -22,8 +22,9 @@ from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.shape import ShapeClass
 from pipeline.messages.objects import object_message, object_of, read_objects
-from pipeline.messages.samples import STORED_AS, Samples, sample_batch, samples_of
+from pipeline.messages.samples import STORED_AS, sample_batch, samples_of
 from pipeline.messages.scenes import read_scene, write_scene
+from pipeline.network.samples import Samples
 from pipeline.world.cameras import PinholeCamera
 from pipeline.world.scene import ClutterScene, PlacedObject
 from pipeline.world.view import CameraView

@@ -26,10 +26,11 @@ from pipeline.geometry.mesh_files import load_mesh_file
 from pipeline.geometry.mesh_folders import MESH_SUFFIXES
 from pipeline.messages.grasps import GraspOrigin, LabelledGrasps, grasp_batch, grasps_of
 from pipeline.messages.objects import object_of
-from pipeline.messages.samples import Samples, sample_batch, samples_of
+from pipeline.messages.samples import sample_batch, samples_of
 from pipeline.messages.training import CHECKPOINT, EXPORT
 from pipeline.network.checkpoint import _digest, load_checkpoint_bytes
 from pipeline.network.control_inference import ControlPredictor
+from pipeline.network.samples import Samples
 from schemas.softgrip.v1.grasps_pb2 import GraspBatch, ShardIndex
 from schemas.softgrip.v1.objects_pb2 import CatalogueObject
 from schemas.softgrip.v1.samples_pb2 import SampleBatch

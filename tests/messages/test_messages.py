@@ -25,7 +25,8 @@ from pipeline.messages.grasps import (
     pads_message,
     pads_of,
 )
-from pipeline.messages.samples import Samples, joined_samples, sample_batch, samples_of
+from pipeline.messages.samples import sample_batch, samples_of
+from pipeline.network.samples import Samples, joined_samples
 from schemas.softgrip.v1.grasps_pb2 import DrapedPads, GraspBatch, ShardEntry
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 

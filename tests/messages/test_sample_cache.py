@@ -11,7 +11,8 @@ from pipeline.artifacts.publishing import scratch_beside
 from pipeline.artifacts.sharding import shard_entry, shard_path, write_index
 from pipeline.errors import ArtifactError
 from pipeline.messages.sample_cache import cached_split
-from pipeline.messages.samples import Samples, joined_samples, sample_batch
+from pipeline.messages.samples import sample_batch
+from pipeline.network.samples import Samples, joined_samples
 
 
 def some_samples(count: int, seed: int) -> Samples:

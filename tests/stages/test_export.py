@@ -14,10 +14,11 @@ import webdataset
 from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder
 from pipeline.interchange.object_grasps import ObjectGrasps
+from pipeline.interchange.reading import grasps_by_object
 from pipeline.interchange.tar_shards import CLASSES
 from pipeline.messages.objects import read_objects
-from pipeline.messages.samples import Samples
-from stages.export import SPLITS, Format, export_run, grasps_by_object
+from pipeline.network.samples import SPLITS, Samples
+from stages.export import Format, export_run
 from stages.shards import read_split
 
 LEAST = 0.6
@@ -25,7 +26,8 @@ LEAST = 0.6
 
 @pytest.fixture(scope="module")
 def grasps(run: RunFolder) -> list[ObjectGrasps]:
-    return grasps_by_object(run)
+    names = ("objects", "scenes", "grasps")
+    return grasps_by_object(*(run.artifact(name) for name in names))
 
 
 def acronym_load(path: Path, root: Path) -> tuple[trimesh.Trimesh, np.ndarray, np.ndarray]:

@@ -1,0 +1,50 @@
+"""What an export reads of a run: grasps by object, and samples by shard."""
+
+from pathlib import Path
+
+from pipeline.artifacts import from_tensor, open_artifact
+from pipeline.artifacts.sharding import listed_shards
+from pipeline.interchange.object_grasps import ObjectGrasps, joined_grasps, split_by_body
+from pipeline.messages.grasps import grasps_of
+from pipeline.messages.objects import read_objects
+from pipeline.messages.samples import samples_of
+from pipeline.network.samples import Samples, joined_samples
+from schemas.softgrip.v1.grasps_pb2 import GraspBatch
+from schemas.softgrip.v1.samples_pb2 import SampleBatch
+from schemas.softgrip.v1.scenes_pb2 import Scene
+
+
+def grasps_by_object(objects: Path, scenes: Path, grasps: Path) -> list[ObjectGrasps]:
+    """Every object that has grasps, in the catalogue's order, with all of them.
+
+    Parameters
+    ----------
+    objects, scenes, grasps
+        The artifacts of these three stages.
+
+    Raises
+    ------
+    ArtifactError
+        One of them, or a shard of grasps, is missing or damaged.
+    """
+    catalogue = read_objects(objects)
+    with open_artifact(scenes) as artifact:
+        poses = {
+            (scene.scene_id, placed.body_id): from_tensor(placed.world_from_object)
+            for _, scene in artifact.messages(Scene)
+            for placed in scene.objects
+        }
+    parts: dict[str, list[ObjectGrasps]] = {}
+    for shard in listed_shards(grasps):
+        with open_artifact(shard) as artifact:
+            for _, message in artifact.messages(GraspBatch):
+                for part in split_by_body(*grasps_of(message), catalogue, poses):
+                    parts.setdefault(part.item.name, []).append(part)
+    return [joined_grasps(parts[name]) for name in catalogue if name in parts]
+
+
+def read_shard(shard: Path) -> tuple[Samples, tuple[str, ...]]:
+    """All samples of a shard, and the names that their ``object_index`` points into."""
+    with open_artifact(shard) as artifact:
+        messages = [message for _, message in artifact.messages(SampleBatch)]
+    return joined_samples([samples_of(m) for m in messages]), tuple(messages[0].object_names)

@@ -1,0 +1,180 @@
+"""A trained network on objects that it never saw, beside what it has to beat; Supplement IV."""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from pipeline.config.grasps import PadConfig
+from pipeline.config.learning import TrainConfig
+from pipeline.geometry.shape import ShapeClass
+from pipeline.network.baselines import (
+    fit_monotone,
+    mean_predictor_mae,
+    seal_ratio,
+    weighted_mean_predictor_mae,
+)
+from pipeline.network.figures import (
+    calibration,
+    error_by_group,
+    error_by_quality_bin,
+    mean_absolute_error,
+    weighted_error,
+)
+from pipeline.network.ga_cnn import GaCnn
+from pipeline.network.inference import predict
+from pipeline.network.samples import Samples
+
+# The names that ``Samples.shape_class`` points into.
+CLASSES = np.array([str(shape_class) for shape_class in ShapeClass])
+
+
+@dataclass(frozen=True)
+class TestFigures:
+    """The network on held-out objects; errors are mean |q̂ − q| of Supplement IV.
+
+    Attributes
+    ----------
+    quality, predicted
+        q and q̂ of the n test samples, shape (n,).
+    mae
+        The error, averaged over the symmetries where the network was trained with them.
+    mae_single
+        The same without averaging over the symmetries.
+    mae_as_proposed, mean_predictor_mae_as_proposed
+        Over grasps as the first round draws them (``Samples.proposal_weight``), where labels are
+        not balanced; None where that is unknown.
+    mean_predictor_mae, seal_ratio_mae
+        Errors of the baselines.
+    by_class
+        Name of a shape class to error.
+    by_pictures
+        "1 picture", "3 pictures", ... that clouds were cut from, to error and samples.
+    first_proposals
+        Samples of the first round, those that ``mae_as_proposed`` is over.
+    count_by_class
+        Name of a shape class to samples.
+    by_tenth
+        Error by tenth of q, None where empty.
+    calibration
+        By tenth of q̂: mean q̂ and mean q (None where empty), count.
+    train_count, val_count
+        Samples that the network learned from and was chosen by.
+    """
+
+    __test__ = False  # not a test case, whatever its name
+
+    quality: Float[np.ndarray, " n"]
+    predicted: Float[np.ndarray, " n"]
+    mae: float
+    mae_single: float
+    mae_as_proposed: float | None
+    mean_predictor_mae: float
+    mean_predictor_mae_as_proposed: float | None
+    seal_ratio_mae: float
+    by_class: dict[str, float]
+    by_pictures: dict[str, tuple[float, int]]
+    first_proposals: int
+    count_by_class: dict[str, int]
+    by_tenth: Sequence[float | None]
+    calibration: Sequence[tuple[float | None, float | None, int]]
+    train_count: int
+    val_count: int
+
+    def headline(self) -> dict[str, Any]:
+        """The errors by the names that a stage's summary gives them."""
+        return {
+            "test_mae": self.mae,
+            "test_mae_single": self.mae_single,
+            "test_mae_as_proposed": self.mae_as_proposed,
+            "mean_predictor_mae": self.mean_predictor_mae,
+            "mean_predictor_mae_as_proposed": self.mean_predictor_mae_as_proposed,
+            "seal_ratio_mae": self.seal_ratio_mae,
+            "test_mae_by_class": self.by_class,
+            "test_mae_by_pictures": {name: error for name, (error, _) in self.by_pictures.items()},
+            "test_mae_by_tenth_of_q": self.by_tenth,
+        }
+
+
+def measure_held_out(
+    network: GaCnn,
+    config: TrainConfig,
+    pad: PadConfig,
+    train_set: Samples,
+    val_set: Samples,
+    test_set: Samples,
+) -> TestFigures:
+    """The network's error on the test split, and that of what it has to beat.
+
+    Parameters
+    ----------
+    network
+        Trained on ``train_set``, chosen by ``val_set``.
+    config
+        Batch size and threads to predict with; whether symmetries are averaged over.
+    pad
+        Its r_v, r_G and steps, for the seal ratio measured by hand.
+    train_set, val_set, test_set
+        The three splits, of different objects.
+
+    Returns
+    -------
+    The figures; baselines are fitted on ``train_set``.
+    """
+    quality, shape_class = np.asarray(test_set.quality), CLASSES[test_set.shape_class]
+    single, averaged = (
+        predict(
+            network,
+            test_set.cloud,
+            test_set.cloud_mask,
+            config.batch_size,
+            config.threads,
+            average_symmetries=averaging,
+        )
+        for averaging in (False, True)
+    )
+    predicted = averaged if config.augment else single
+    radius, tolerance = pad.seal_radius_m / pad.radius_m, pad.distance_step_m / pad.radius_m
+    train_ratio, test_ratio = (
+        seal_ratio(samples.cloud, samples.cloud_mask, radius, tolerance)
+        for samples in (train_set, test_set)
+    )
+    by_seal = fit_monotone(train_ratio, train_set.quality).predict(test_ratio)
+    return TestFigures(
+        quality=quality,
+        predicted=predicted,
+        mae=mean_absolute_error(predicted, quality),
+        mae_single=mean_absolute_error(single, quality),
+        mae_as_proposed=weighted_error(predicted, quality, test_set.proposal_weight),
+        mean_predictor_mae=mean_predictor_mae(train_set.quality, quality),
+        mean_predictor_mae_as_proposed=weighted_mean_predictor_mae(
+            train_set.quality, train_set.proposal_weight, quality, test_set.proposal_weight
+        ),
+        seal_ratio_mae=mean_absolute_error(by_seal, quality),
+        by_class=error_by_group(predicted, quality, shape_class),
+        by_pictures=error_by_pictures(predicted, test_set),
+        first_proposals=int((np.asarray(test_set.proposal_weight) > 0).sum()),
+        count_by_class=dict(Counter(shape_class.tolist())),
+        by_tenth=[found.mae for found in error_by_quality_bin(predicted, quality)],
+        calibration=[
+            (found.mean_predicted, found.mean_quality, found.count)
+            for found in calibration(predicted, quality)
+        ],
+        train_count=len(train_set),
+        val_count=len(val_set),
+    )
+
+
+def error_by_pictures(
+    predicted: Float[np.ndarray, " n"], test_set: Samples
+) -> dict[str, tuple[float, int]]:
+    """Mean |q̂ − q| and number of the samples whose clouds were cut from 1, 2, ... pictures."""
+    counts = Counter(np.asarray(test_set.pictures).tolist())
+    errors = error_by_group(predicted, np.asarray(test_set.quality), np.asarray(test_set.pictures))
+    return {
+        f"{pictures} picture{'s' if pictures > 1 else ''}": (errors[str(pictures)], count)
+        for pictures, count in sorted(counts.items())
+    }
