@@ -16,13 +16,21 @@ from pipeline.artifacts import publish_bytes
 from pipeline.config import load_run_config
 from pipeline.errors import ConfigError
 from pipeline.execution.commands import run_command
-from pipeline.execution.freshness import key_from_json
-from pipeline.execution.running import built_key, is_fresh, missing_shards, stage_context
-from pipeline.execution.stage import RunFolder, Stage
+from pipeline.execution.stage import RunFolder, Stage, StageContext
+from pipeline.execution.staleness import (
+    missing_shards,
+    recording_is_fresh,
+    stage_context,
+    why_stale,
+)
 from pipeline.geometry.mesh_folders import FAMILIES_FILE, list_mesh_files
 
-OBJECTS = Stage("objects", ("seed", "objects", "split", "recording.objects"))
-SCENES = Stage("scenes", ("seed", "scenes", "cameras", "recording.scenes"), ("objects",))
+OBJECTS = Stage(
+    "objects", ("seed", "objects", "split"), shown=("recording.objects",), drawn_apart=True
+)
+SCENES = Stage(
+    "scenes", ("seed", "scenes", "cameras", "recording.scenes"), ("objects",), renders=True
+)
 GRASPS = Stage(
     "grasps",
     ("seed", "gripper", "sensing", "grasps", "recording.grasps"),
@@ -79,12 +87,12 @@ def key(stage: str, run: RunName = "default", mesh_dir: MeshDir = None) -> None:
     folder = RunFolder(RUNS_DIR / run)
     context = stage_context(MADE[stage], folder, inputs_of, mesh_dir, workers=1)
     path = folder.state(f"{stage}.key")
-    text = context.key.to_json()
-    if path.is_file() and path.read_text() == text and not _lost(folder, stage):
+    text = context.key.to_json() + context.drawing_key.to_json()
+    if path.is_file() and path.read_text() == text and not _lost(context):
         return
-    if path.is_file():
-        for change in context.key.differences(key_from_json(path.read_text())):
-            logger.info("{}: {}", stage, change)
+    if context.output.is_file():
+        for reason in why_stale(context):
+            logger.info("{}: {}", stage, reason)
     publish_bytes(path, text.encode())
     if MADE[stage] is OBJECTS:
         # What train and eval stay with when they are called without MESH_DIR.
@@ -113,19 +121,15 @@ def _staleness(stage: Stage, folder: RunFolder, mesh_dir: Path | None, stale: se
     waits_for = [name for name in stage.upstream if name in stale]
     if waits_for:
         return f"after {', '.join(waits_for)}"
-    context = stage_context(stage, folder, inputs_of, mesh_dir, workers=1)
-    if is_fresh(context):
-        return ""
-    built = built_key(folder, stage.name)
-    if built is None:
-        return "never made"
-    return "; ".join(context.key.differences(built)) or "artifact, shard or recording missing"
+    return "; ".join(why_stale(stage_context(stage, folder, inputs_of, mesh_dir, workers=1)))
 
 
-def _lost(folder: RunFolder, stage: str) -> bool:
-    """Whether a shard of a finished stage has gone: Make sees the index alone."""
-    index = folder.artifact(stage)
-    return MADE[stage].sharded and index.is_file() and bool(missing_shards(index))
+def _lost(context: StageContext) -> bool:
+    """Whether part of a finished stage has gone: Make sees the artifact, or its index, alone."""
+    if not context.output.is_file():
+        return False
+    shards_lost = context.stage.sharded and bool(missing_shards(context.output))
+    return shards_lost or not recording_is_fresh(context)
 
 
 if __name__ == "__main__":

@@ -36,8 +36,7 @@ from pipeline.geometry.splits import split_objects
 from pipeline.geometry.stretching import near_held_out, stretched_copies
 from pipeline.geometry.urdf_files import load_object_file, standalone
 from pipeline.messages.objects import REFUSED_TOPIC, TOPIC, object_message, refused_message
-from pipeline.recording.objects import blueprint, show_catalogue
-from pipeline.recording.recording import recording, spread
+from pipeline.recording.objects import draw_objects
 from schemas.softgrip.v1.objects_pb2 import RefusedMesh
 from stages.graph import OBJECTS, inputs_of
 
@@ -182,11 +181,7 @@ def publish(
     split: Mapping[str, Split],
     refused: list[RefusedMesh],
 ) -> None:
-    """Write the recording, then the artifact: what is there last makes the stage whole."""
-    shown = [objects[i] for i in spread(len(objects), stage.config.recording.objects)]
-    opening = blueprint(len(shown), max(item.nsvr for item in shown))
-    with recording(stage, opening) as stream:
-        show_catalogue(stream, [(item, split[item.name]) for item in shown])
+    """Write the artifact."""
     with ArtifactWriter(stage.output, stage.provenance()) as artifact:
         for index, item in enumerate(objects):
             artifact.write(TOPIC, object_message(item, split[item.name]), log_time_ns=index)
@@ -211,4 +206,4 @@ def summary(
 
 
 if __name__ == "__main__":
-    stage_command(OBJECTS, build, inputs_of)
+    stage_command(OBJECTS, build, inputs_of, draw=draw_objects)

@@ -59,6 +59,7 @@ def described(contents: Contents) -> str:
         f"key        {made.key}",
         f"config     {made.config_digest}",
         f"code       {made.code_digest}",
+        *(f"made with  {name} {value}" for name, value in made.machine.items()),
         *(f"input      {entry.path}  {entry.sha256}" for entry in made.inputs),
         *(f"topic      {t}: {n} {schema}" for t, (schema, n) in contents.counts.items()),
         *(f"attached   {name}: {size} bytes" for name, size in contents.attachments.items()),

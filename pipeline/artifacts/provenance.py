@@ -25,7 +25,8 @@ class Input:
 class Provenance:
     """What made a file. Equal provenance means equal bytes.
 
-    key : digest over configuration, code and inputs; the freshness criterion.
+    key : digest over configuration, code, machine and inputs; the freshness criterion.
+    key_parts : what that digest is over, as JSON; empty in files that do not tell it.
     """
 
     stage: str
@@ -36,6 +37,12 @@ class Provenance:
     inputs: tuple[Input, ...]
     package_version: str
     schema_version: str = SCHEMA_VERSION
+    key_parts: str = ""
+
+    @property
+    def machine(self) -> dict[str, str]:
+        """Python, renderer and packages that it was made with; empty where the file tells none."""
+        return dict(json.loads(self.key_parts)["machine"]) if self.key_parts else {}
 
     def to_metadata(self) -> dict[str, str]:
         """The record as MCAP metadata (strings only)."""
@@ -66,7 +73,7 @@ class Provenance:
             )
         try:
             inputs = tuple(Input(**entry) for entry in json.loads(metadata["inputs"]))
-            return cls(
+            made = cls(
                 stage=metadata["stage"],
                 key=metadata["key"],
                 config_digest=metadata["config_digest"],
@@ -74,12 +81,15 @@ class Provenance:
                 seed=int(metadata["seed"]),
                 inputs=inputs,
                 package_version=metadata["package_version"],
+                key_parts=metadata.get("key_parts", ""),
             )
+            _ = made.machine  # it can be read
         except (KeyError, TypeError, ValueError) as error:
             raise ArtifactError(
                 f"The provenance record cannot be read ({error!r})",
                 "The file is damaged: make it again",
             ) from error
+        return made
 
 
 def _digest(record: dict[str, str]) -> str:

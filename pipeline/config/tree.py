@@ -12,9 +12,12 @@ import math
 import operator
 import re
 import tomllib
+from collections.abc import Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
+import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
 from pipeline.config.cameras import CamerasConfig
@@ -110,7 +113,7 @@ def load_run_config(path: Path) -> RunConfig:
 
 
 def section_digest(config: RunConfig, sections: tuple[str, ...]) -> str:
-    """SHA-256 over the named sections' values, independent of file layout.
+    """SHA-256 over the named sections' values, derived ones included, whatever the file's layout.
 
     sections : names such as ``"grasps"`` or, for one field of a section, ``"recording.grasps"``.
     """
@@ -119,7 +122,30 @@ def section_digest(config: RunConfig, sections: tuple[str, ...]) -> str:
 
 
 def _plain(value: Any) -> Any:
-    return value.model_dump(mode="json") if isinstance(value, Section) else value
+    """A value as JSON knows it; a section with what it derives from its fields as properties."""
+    if isinstance(value, Section):
+        return {name: _plain(getattr(value, name)) for name in _value_names(type(value))}
+    if isinstance(value, Mapping):
+        return {str(name): _plain(entry) for name, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if value is None or isinstance(value, str | int | float):
+        return value
+    raise TypeError(f"{type(value).__name__} is no value of a configuration")
+
+
+def _value_names(section: type[Section]) -> list[str]:
+    """Fields of a section and its public properties."""
+    derived = {
+        name
+        for cls in section.__mro__
+        if issubclass(cls, Section)
+        for name, member in vars(cls).items()
+        if isinstance(member, property | cached_property) and not name.startswith("_")
+    }
+    return sorted({*section.model_fields, *section.model_computed_fields, *derived})
 
 
 def _explained(path: Path, error: ValidationError) -> ConfigError:

@@ -1,38 +1,52 @@
-"""Fresh by content, not by date: what a stage's result depends on, as one key.
+"""Fresh by content, not by date: what a stage's artifact and its recording depend on, as keys.
 
-A key holds three parts: the digests of the configuration sections the stage
-reads, of every source file its module reaches by import, and of its inputs'
-content. A stage is fresh when its artifact carries the key of today.
+A key holds four parts: the digests of the configuration sections the stage reads, of every source
+file its module reaches by import, what the machine brings (Python, the packages that decide, the
+renderer), and the digests of its inputs' content. An artifact is fresh when it carries the key of
+today. A recording has a key of its own, as it is drawn from a finished artifact: what only draws
+changes that key alone.
 """
 
-import ast
 import hashlib
 import json
+import platform
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 from pipeline.artifacts.publishing import file_sha256, publish_bytes
 from pipeline.config import RunConfig, section_digest
+from pipeline.execution.code import DRAWING, RUNNING, code_digests
+from pipeline.execution.packages import package_versions
 
-ROOT = Path(__file__).resolve().parents[2]
-OUR_PACKAGES = ("pipeline", "stages", "schemas")
-VALUES_ONLY = "pipeline.config"  # its values are digested themselves, its text decides nothing
+PARTS = ("config", "code", "machine", "inputs")
 
 
 @dataclass(frozen=True)
 class Key:
-    """What a stage's result depends on, part by part."""
+    """What a result depends on, part by part.
+
+    Parameters
+    ----------
+    config
+        Configuration section → digest of its values.
+    code
+        Source file → digest of its code.
+    machine
+        ``python``, ``renderer`` and packages → version, in words.
+    inputs
+        Input → digest of its content.
+    """
 
     config: dict[str, str]
     code: dict[str, str]
+    machine: dict[str, str]
     inputs: dict[str, str]
 
     @property
     def digest(self) -> str:
         """SHA-256 over all parts."""
-        return _digest({"config": self.config, "code": self.code, "inputs": self.inputs})
+        return _digest(self._parts())
 
     @property
     def config_digest(self) -> str:
@@ -46,8 +60,7 @@ class Key:
 
     def to_json(self) -> str:
         """The parts as text, stable from run to run."""
-        parts = {"config": self.config, "code": self.code, "inputs": self.inputs}
-        return json.dumps(parts, indent=1, sort_keys=True) + "\n"
+        return json.dumps(self._parts(), indent=1, sort_keys=True) + "\n"
 
     def differences(self, older: "Key") -> list[str]:
         """What changed since ``older``, in words."""
@@ -56,47 +69,86 @@ class Key:
             now, then = getattr(self, part), getattr(older, part)
             found += [f"{word} {name} changed" for name in now if now[name] != then.get(name)]
             found += [f"{word} {name} is gone" for name in then if name not in now]
+        for name in sorted(self.machine | older.machine):
+            now, then = (key.machine.get(name, "absent") for key in (self, older))
+            found += [f"{name} was {then}, is {now}"] if now != then else []
         return found
+
+    def _parts(self) -> dict[str, dict[str, str]]:
+        return {part: getattr(self, part) for part in PARTS}
 
 
 def key_from_json(text: str) -> Key:
-    """Read back ``Key.to_json``."""
+    """Read back ``Key.to_json``.
+
+    Raises
+    ------
+    ValueError
+        It is none, or one of an earlier softgrip, which knew other parts.
+    """
     parts = json.loads(text)
-    return Key(config=parts["config"], code=parts["code"], inputs=parts["inputs"])
+    if not isinstance(parts, dict) or set(parts) != set(PARTS):
+        raise ValueError("it is not the key of this softgrip")
+    return Key(**parts)
 
 
 def stage_key(
-    config: RunConfig, sections: tuple[str, ...], module: str, inputs: dict[str, Path], memo: Path
+    config: RunConfig,
+    sections: tuple[str, ...],
+    module: str,
+    inputs: dict[str, Path],
+    memo: Path,
+    renderer: str = "",
+    without: tuple[str, ...] = DRAWING + RUNNING,
 ) -> Key:
-    """The key of a stage as things are now.
+    """The key of a stage's artifact as things are now.
 
-    sections : configuration sections the stage reads, dotted for a part of one.
-    inputs : name → file; contents are hashed, with ``memo`` remembering what did not change.
+    Parameters
+    ----------
+    config
+        The run's configuration.
+    sections
+        Configuration sections that the stage reads, dotted for a part of one.
+    module
+        The Python module that runs it.
+    inputs
+        Name → file; contents are hashed.
+    memo
+        File that remembers the hashes of what did not change.
+    renderer
+        What its pictures come from; empty where it renders none.
+    without
+        Modules and packages of ours that decide nothing of the artifact.
     """
+    machine = {"python": platform.python_version(), **package_versions(module, without)}
     return Key(
         config={name: section_digest(config, (name,)) for name in sections},
-        code=code_digests(module),
+        code=code_digests(module, without),
+        machine=machine | ({"renderer": renderer} if renderer else {}),
         inputs=content_digests(inputs, memo),
     )
 
 
-@lru_cache
-def code_digests(module: str) -> dict[str, str]:
-    """SHA-256 of each of our source files that ``module`` reaches by import."""
-    found: dict[str, str] = {}
-    waiting = [module]
-    seen = set()
-    while waiting:
-        name = waiting.pop()
-        path = _source_of(name)
-        if name in seen or path is None:
-            continue
-        seen.add(name)
-        source = path.read_bytes()
-        found[str(path.relative_to(ROOT))] = hashlib.sha256(source).hexdigest()
-        waiting += _imports(source)
-        waiting += [name.rpartition(".")[0]] if "." in name else []
-    return dict(sorted(found.items()))
+def drawing_key(config: RunConfig, shown: tuple[str, ...], module: str, artifact: Key) -> Key:
+    """The key of a recording, which is drawn from a finished artifact.
+
+    Parameters
+    ----------
+    config
+        The run's configuration.
+    shown
+        Configuration that says how much is shown, dotted.
+    module
+        The Python module that draws.
+    artifact
+        The key of what is drawn.
+    """
+    return Key(
+        config={name: section_digest(config, (name,)) for name in shown},
+        code=code_digests(module, without=RUNNING),
+        machine=package_versions(module, without=RUNNING),
+        inputs={"artifact": artifact.digest},
+    )
 
 
 def content_digests(files: dict[str, Path], memo: Path) -> dict[str, str]:
@@ -118,27 +170,6 @@ def content_digests(files: dict[str, Path], memo: Path) -> dict[str, str]:
     if any(known.get(path) != entry for path, entry in fresh.items()):
         publish_bytes(memo, json.dumps({**known, **fresh}, indent=1, sort_keys=True).encode())
     return digests
-
-
-def _imports(source: bytes) -> list[str]:
-    """Names of our modules that a source file imports, also inside functions."""
-    names = []
-    for node in ast.walk(ast.parse(source)):
-        if isinstance(node, ast.Import):
-            names += [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
-            names.append(node.module)
-            names += [f"{node.module}.{alias.name}" for alias in node.names]
-    ours = [name for name in names if name.split(".")[0] in OUR_PACKAGES]
-    return [name for name in ours if not name.startswith(VALUES_ONLY)]
-
-
-def _source_of(module: str) -> Path | None:
-    base = ROOT.joinpath(*module.split("."))
-    for candidate in (base.with_suffix(".py"), base / "__init__.py"):
-        if candidate.is_file():
-            return candidate
-    return None
 
 
 def _digest(value: Any) -> str:

@@ -16,32 +16,50 @@ import typer
 from filelock import FileLock, Timeout
 from loguru import logger
 
-from pipeline.artifacts import open_artifact, publish_bytes, read_provenance
+from pipeline.artifacts import publish_bytes
 from pipeline.artifacts.publishing import CANNOT_WRITE, remove_abandoned_scratch, write_error
-from pipeline.config import load_run_config
-from pipeline.errors import ArtifactError, ConfigError, SoftgripError
+from pipeline.errors import SoftgripError
 from pipeline.execution.commands import EXIT_FAILURE, words_to
 from pipeline.execution.executors import Executor
-from pipeline.execution.freshness import Key, key_from_json, stage_key
 from pipeline.execution.stage import RunFolder, Stage, StageContext
+from pipeline.execution.staleness import (
+    MEMO,
+    InputsOf,
+    artifact_is_fresh,
+    drawn_note,
+    is_fresh,
+    stage_context,
+)
 from pipeline.stopwatch import processor_time_s
-from schemas.softgrip.v1.grasps_pb2 import ShardIndex
 
 Summary = dict[str, Any]
 Build = Callable[[StageContext], Summary]
-InputsOf = Callable[[Stage, RunFolder, Path | None], dict[str, Path]]
+Draw = Callable[[StageContext, Summary], None]
 
 CLOCK_TICK_S = 0.01  # what processor time is counted in
 
 EXIT_INTERRUPTED = 130
-MEMO = "hashes.json"
 
 
-def stage_command(stage: Stage, build: Build, inputs_of: InputsOf, rank: int = 0) -> None:
+def stage_command(
+    stage: Stage, build: Build, inputs_of: InputsOf, rank: int = 0, draw: Draw | None = None
+) -> None:
     """The command line of a stage's module.
 
-    rank : this process's number among several that build together; the first alone holds the
-        run, tells and publishes.
+    Parameters
+    ----------
+    stage
+        What it is.
+    build
+        Makes the artifact, and returns the headline figures.
+    inputs_of
+        Name → file of everything a stage reads.
+    rank
+        This process's number among several that build together; the first alone holds the run,
+        tells and publishes.
+    draw
+        Draws the recording from the finished artifact and the headline figures; without it
+        ``build`` draws.
     """
 
     def command(
@@ -66,11 +84,11 @@ def stage_command(stage: Stage, build: Build, inputs_of: InputsOf, rank: int = 0
             context = stage_context(stage, folder, inputs_of, mesh_dir, workers, memo)
             context = replace(context, executor=executor)
             if rank > 0:
-                if force or not is_fresh(context):
+                if force or not artifact_is_fresh(context):
                     build(context)
                 return
             with _exclusive(folder, stage):
-                run_stage(context, build, force=force)
+                run_stage(context, build, force, draw)
 
     command.__doc__ = build.__doc__
     app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
@@ -78,89 +96,66 @@ def stage_command(stage: Stage, build: Build, inputs_of: InputsOf, rank: int = 0
     app()
 
 
-def stage_context(
-    stage: Stage,
-    folder: RunFolder,
-    inputs_of: InputsOf,
-    mesh_dir: Path | None,
-    workers: int,
-    memo: str = MEMO,
-) -> StageContext:
-    """Configuration, inputs and key of a stage as things are now.
+def run_stage(
+    context: StageContext, build: Build, force: bool = False, draw: Draw | None = None
+) -> None:
+    """Run a stage unless it is fresh; leave artifact, recording and summary.
 
-    memo : file of the run's state in which hashes of unchanged inputs are kept.
-
-    Raises
-    ------
-    ConfigError : run.toml cannot be used.
-    ArtifactError : an upstream artifact is missing.
+    Where the recording alone is stale, it is drawn anew and the artifact stays as it is.
     """
-    if "/" in folder.path.name or folder.path.name in ("", ".", ".."):
-        raise ConfigError(f"'{folder.path.name}' is no run name", "Use a plain name")
-    config = load_run_config(folder.config)
-    inputs = inputs_of(stage, folder, mesh_dir)
-    for name, path in inputs.items():
-        if not path.is_file():
-            raise ArtifactError(
-                f"{path} is missing, and {stage.name} reads it",
-                f"Make {name} first: 'make {stage.name} RUN={folder.path.name}' does both",
-            )
-    key = stage_key(config, stage.sections, stage.module, inputs, folder.state(memo))
-    return StageContext(stage, config, folder, key, inputs, workers, mesh_dir)
-
-
-def is_fresh(context: StageContext) -> bool:
-    """Whether the stage's artifact is whole and was made from what is there now."""
-    output = context.output
-    if not output.is_file() or not context.recording.is_file():
-        return False
-    try:
-        if read_provenance(output).key != context.key.digest:
-            return False
-        return not context.stage.sharded or not missing_shards(output)
-    except ArtifactError as error:
-        logger.warning("{}", error)
-        return False
-
-
-def missing_shards(index: Path) -> list[Path]:
-    """Files that a sharded artifact's index names and that are not there."""
-    with open_artifact(index) as artifact:
-        entries = artifact.one(ShardIndex).shards
-    paths = [index.parent / entry.path for entry in entries]
-    return [path for path in paths if not path.is_file()]
-
-
-def run_stage(context: StageContext, build: Build, force: bool) -> None:
-    """Run a stage unless it is fresh; leave artifact, recording and summary."""
     name, output = context.stage.name, context.output
     if not force and is_fresh(context):
         os.utime(output)  # Make compares dates: what is fresh by content is new by date
         logger.info("{}: up to date, nothing to do", name)
         return
     started, spent_s = time.perf_counter(), processor_time_s()
+    if draw is not None and not force and artifact_is_fresh(context):
+        logger.info("{}: the artifact is up to date, its recording is drawn anew", name)
+        record = kept_summary(context.folder, name)
+        drawn(context, draw, record)
+        _publish_summary(context, record | _recording_size(context))
+        os.utime(output)
+        logger.info("{}: drawn in {:.1f} s", name, time.perf_counter() - started)
+        return
     logger.info("{}: started ({} workers)", name, context.workers)
-    summary = build(context)
+    figures = build(context)
+    if draw is not None:
+        drawn(context, draw, figures)
     wall_s, spent_s = time.perf_counter() - started, processor_time_s() - spent_s
     record = {
         "stage": name,
         "key": context.key.digest,
         "wall_time_s": round(wall_s, 3),
         "recording_share": round(context.drawing.seconds / max(spent_s, CLOCK_TICK_S), 4),
-        "recording_mb": round(context.recording.stat().st_size / 1e6, 3),
-        **summary,
+        **_recording_size(context),
+        **figures,
     }
-    publish_bytes(context.folder.summary(name), (json.dumps(record, indent=2) + "\n").encode())
-    publish_bytes(context.folder.state(f"{name}.built.json"), context.key.to_json().encode())
+    _publish_summary(context, record)
     logger.info("{}: done in {:.1f} s, {}", name, wall_s, output)
 
 
-def built_key(folder: RunFolder, stage: str) -> Key | None:
-    """The key a stage was last built with, part by part."""
+def drawn(context: StageContext, draw: Draw, figures: Summary) -> None:
+    """Draw the recording, and note what it was drawn from and by."""
+    draw(context, figures)
+    note = context.drawing_key.to_json().encode()
+    publish_bytes(drawn_note(context.folder, context.name), note)
+
+
+def kept_summary(folder: RunFolder, stage: str) -> Summary:
+    """The summary of a stage that is made; empty where the file is lost."""
     try:
-        return key_from_json(folder.state(f"{stage}.built.json").read_text())
-    except FileNotFoundError:
-        return None
+        return dict(json.loads(folder.summary(stage).read_text()))
+    except (FileNotFoundError, ValueError):
+        return {}
+
+
+def _recording_size(context: StageContext) -> Summary:
+    return {"recording_mb": round(context.recording.stat().st_size / 1e6, 3)}
+
+
+def _publish_summary(context: StageContext, record: Summary) -> None:
+    text = json.dumps(record, indent=2) + "\n"
+    publish_bytes(context.folder.summary(context.name), text.encode())
 
 
 @contextmanager

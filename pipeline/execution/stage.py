@@ -14,20 +14,42 @@ from pipeline.stopwatch import Stopwatch
 class Stage:
     """One stage of the pipeline, as data.
 
-    sections : configuration sections its result depends on.
-    upstream : stages whose artifacts it reads.
-    sharded : its artifact is an index over files in a folder of the same name.
+    Parameters
+    ----------
+    name
+        Of its module in stages/, its artifact and its recording.
+    sections
+        Configuration sections its artifact depends on.
+    upstream
+        Stages whose artifacts it reads.
+    sharded
+        Its artifact is an index over files in a folder of the same name.
+    renders
+        Its pictures come from the renderer that ``cameras.renderer`` names.
+    shown
+        Configuration that says how much its recording shows.
+    drawn_apart
+        Its recording is drawn from its finished artifact, by `drawing_module`, so that what only
+        draws makes the recording anew and leaves the artifact.
     """
 
     name: str
     sections: tuple[str, ...]
     upstream: tuple[str, ...] = ()
     sharded: bool = False
+    renders: bool = False
+    shown: tuple[str, ...] = ()
+    drawn_apart: bool = False
 
     @property
     def module(self) -> str:
         """The Python module that runs it."""
         return f"stages.{self.name}"
+
+    @property
+    def drawing_module(self) -> str:
+        """The Python module that draws its recording from its artifact."""
+        return f"pipeline.recording.{self.name}"
 
 
 @dataclass(frozen=True)
@@ -79,6 +101,7 @@ class StageContext:
     config: RunConfig
     folder: RunFolder
     key: Key
+    drawing_key: Key
     inputs: dict[str, Path]
     workers: int
     mesh_dir: Path | None
@@ -124,4 +147,5 @@ class StageContext:
             seed=self.config.seed,
             inputs=tuple(Input(name, digest) for name, digest in self.key.inputs.items()),
             package_version=package_version(),
+            key_parts=self.key.to_json(),
         )

@@ -9,7 +9,7 @@ import sapien
 from pipeline.errors import MachineError
 
 _LAVAPIPE_MANIFESTS = "lvp_icd*.json"
-_MANIFEST_FOLDERS = (
+MANIFEST_FOLDERS = (
     Path("/etc/vulkan/icd.d"),
     Path("/usr/local/share/vulkan/icd.d"),
     Path("/usr/share/vulkan/icd.d"),
@@ -17,7 +17,7 @@ _MANIFEST_FOLDERS = (
 # CoACD's library and SAPIEN's share symbols that the linker makes one a process. With CoACD's
 # taken, lavapipe's pictures have the right depth and no light (coacd 1.0.14, sapien 3.0.3).
 _COACD_CAME_FIRST = "coacd" in sys.modules
-_USER_CHOICES = ("VK_ICD_FILENAMES", "VK_DRIVER_FILES")
+USER_CHOICES = ("VK_ICD_FILENAMES", "VK_DRIVER_FILES")
 
 
 def gpu_present() -> bool:
@@ -32,9 +32,9 @@ def choose_vulkan_driver() -> None:
     Must run before the process's first render system. Does nothing where a GPU is present,
     where VK_ICD_FILENAMES or VK_DRIVER_FILES is set, or where lavapipe is not installed.
     """
-    if gpu_present() or any(os.environ.get(name) for name in _USER_CHOICES):
+    if gpu_present() or any(os.environ.get(name) for name in USER_CHOICES):
         return
-    for folder in _MANIFEST_FOLDERS:
+    for folder in MANIFEST_FOLDERS:
         for manifest in sorted(folder.glob(_LAVAPIPE_MANIFESTS)):
             os.environ["VK_ICD_FILENAMES"] = str(manifest)
             return

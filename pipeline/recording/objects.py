@@ -1,6 +1,7 @@
 """objects.rrd: the catalogue laid out, and each object with its convex parts and its NSVR."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import rerun as rr
@@ -8,12 +9,31 @@ import rerun.blueprint as rrb
 
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.shape import COMPLEX_FROM, TYPICAL_FROM
+from pipeline.messages.objects import read_objects
 from pipeline.recording import colours
-from pipeline.recording.recording import looking, name_curve, numbered, step, time_panel
+from pipeline.recording.recording import (
+    MadeStage,
+    looking,
+    name_curve,
+    numbered,
+    recording,
+    spread,
+    step,
+    time_panel,
+)
 from pipeline.recording.shapes import shown_facets, shown_mesh
 
 TIMELINE = "object"
 SPACING_M = 0.22
+
+
+def draw_objects(stage: MadeStage, figures: Mapping[str, Any]) -> None:
+    """Draw the recording from the finished catalogue."""
+    items = list(read_objects(stage.output).values())
+    shown = [items[i] for i in spread(len(items), stage.config.recording.objects)]
+    opening = blueprint(len(shown), max(item.nsvr for item, _ in shown))
+    with recording(stage, opening) as stream:
+        show_catalogue(stream, shown)
 
 
 def blueprint(objects: int, greatest_nsvr: float) -> rrb.Blueprint:

@@ -31,6 +31,7 @@ from jaxtyping import UInt8
 from loguru import logger
 
 from pipeline.artifacts.publishing import published
+from pipeline.config import RunConfig
 from pipeline.stopwatch import Stopwatch
 
 APPLICATION = "softgrip"
@@ -66,6 +67,21 @@ class Recorded(Protocol):
     @property
     def drawing(self) -> Stopwatch:
         """Counts the processor time that recording takes."""
+
+
+class MadeStage(Recorded, Protocol):
+    """A stage whose artifact is finished: what its recording is drawn from."""
+
+    @property
+    def config(self) -> RunConfig:
+        """The run's configuration."""
+
+    @property
+    def output(self) -> Path:
+        """The stage's artifact."""
+
+    def upstream(self, stage: str) -> Path:
+        """The artifact of a stage that this one reads."""
 
 
 @contextmanager

@@ -1,11 +1,13 @@
 """run.toml becomes a tree, or one sentence that names the key."""
 
+import math
 from pathlib import Path
 
 import pytest
-from pydantic import ValidationError
+from pydantic import ValidationError, model_validator
 
 from pipeline.config import GripperConfig, RunConfig, load_run_config, section_digest
+from pipeline.config.section import Section
 from pipeline.errors import ConfigError
 from tests.refusals import assert_refused_cheaply
 
@@ -120,3 +122,36 @@ def test_a_digest_depends_on_values_of_its_sections_alone(tmp_path: Path) -> Non
     assert section_digest(plain, ("recording.grasps",)) == section_digest(
         other, ("recording.grasps",)
     )
+
+
+class _Disc(Section):
+    radius_m: float = 0.025
+
+    @property
+    def area_m2(self) -> float:
+        return 3.0 * self.radius_m**2
+
+
+class _BetterDisc(_Disc):
+    @property
+    def area_m2(self) -> float:
+        return math.pi * self.radius_m**2
+
+
+class _RoundedDisc(_Disc):
+    @model_validator(mode="before")
+    @classmethod
+    def _rounded(cls, values: dict[str, float]) -> dict[str, float]:
+        return {name: round(value, 2) for name, value in values.items()}
+
+
+class _Discs(Section):
+    disc: _Disc
+
+
+def test_a_digest_follows_what_is_derived_and_what_validators_make() -> None:
+    def digest(disc: type[_Disc]) -> str:
+        run = RunConfig().model_copy(update={"gripper": _Discs(disc=disc(radius_m=0.0251))})
+        return section_digest(run, ("gripper",))
+
+    assert len({digest(disc) for disc in (_Disc, _BetterDisc, _RoundedDisc)}) == 3

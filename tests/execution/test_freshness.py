@@ -2,14 +2,16 @@
 
 import json
 import os
+import platform
 from pathlib import Path
 
+import pytest
+
 from pipeline.config import RunConfig
-from pipeline.execution import freshness
 from pipeline.execution.freshness import (
     Key,
-    code_digests,
     content_digests,
+    drawing_key,
     key_from_json,
     stage_key,
 )
@@ -42,50 +44,54 @@ def test_a_damaged_memo_is_only_a_slower_start(tmp_path: Path) -> None:
     assert content_digests({"a": file}, memo) == before
 
 
-def test_code_reached_by_import_counts_and_other_code_does_not() -> None:
-    reached = code_digests("pipeline.artifacts.tensors")
-    assert "pipeline/artifacts/tensors.py" in reached
-    assert "pipeline/errors.py" in reached
-    assert "schemas/softgrip/v1/tensor_pb2.py" in reached
-    assert not any(path.startswith("pipeline/execution") for path in reached)
-
-
-def test_configuration_text_is_left_to_its_values() -> None:
-    assert not any("config" in path for path in code_digests("pipeline.gripper.quality"))
-
-
-def test_edited_code_changes_the_key(tmp_path: Path) -> None:
-    package = tmp_path / "pipeline"
-    package.mkdir()
-    (package / "__init__.py").touch()
-    (package / "a.py").write_text("from pipeline import b\n")
-    (package / "b.py").write_text("X = 1\n")
-    root = freshness.ROOT
-    try:
-        freshness.ROOT = tmp_path
-        code_digests.cache_clear()
-        before = code_digests("pipeline.a")
-        (package / "b.py").write_text("X = 2\n")
-        code_digests.cache_clear()
-        after = code_digests("pipeline.a")
-    finally:
-        freshness.ROOT = root
-        code_digests.cache_clear()
-    changed = [path for path in after if after[path] != before[path]]
-    assert changed == ["pipeline/b.py"]
-
-
 def test_differences_are_told_in_words() -> None:
-    old = Key({"grasps": "1"}, {"a.py": "1"}, {"x.mcap": "1", "gone": "1"})
-    new = Key({"grasps": "2"}, {"a.py": "1"}, {"x.mcap": "2"})
+    old = Key({"grasps": "1"}, {"a.py": "1"}, {"python": "3.11", "numpy": "2"}, {"x.mcap": "1"})
+    new = Key({"grasps": "2"}, {"b.py": "1"}, {"python": "3.12", "renderer": "r"}, {"x.mcap": "2"})
     assert new.differences(old) == [
         "configuration grasps changed",
+        "code b.py changed",
+        "code a.py is gone",
         "input x.mcap changed",
-        "input gone is gone",
+        "numpy was 2, is absent",
+        "python was 3.11, is 3.12",
+        "renderer was absent, is r",
     ]
 
 
-def test_a_key_survives_its_file(tmp_path: Path) -> None:
-    key = stage_key(RunConfig(), ("seed",), "pipeline.errors", {}, tmp_path / "memo.json")
+def test_every_part_is_in_the_digest() -> None:
+    parts = {"config": {"a": "1"}, "code": {"a": "1"}, "machine": {"a": "1"}, "inputs": {"a": "1"}}
+    digests = {Key(**{**parts, part: {"a": "2"}}).digest for part in parts}
+    assert len(digests | {Key(**parts).digest}) == 5
+
+
+def test_a_key_survives_its_file_and_an_earlier_softgrips_is_none(tmp_path: Path) -> None:
+    key = stage_key(RunConfig(), ("seed",), "pipeline.errors", {}, tmp_path / "memo.json", "r")
     assert key_from_json(key.to_json()) == key
+    assert key.machine["renderer"] == "r"
     assert json.loads(key.to_json())["config"].keys() == {"seed"}
+    for other in ('{"config": {}, "code": {}, "inputs": {}}', "[]", ""):
+        with pytest.raises(ValueError, match=r"not the key|Expecting value"):
+            key_from_json(other)
+
+
+def test_python_is_part_of_a_key(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def key() -> Key:
+        return stage_key(RunConfig(), ("seed",), "pipeline.errors", {}, tmp_path / "memo.json")
+
+    before = key()
+    monkeypatch.setattr(platform, "python_version", lambda: "3.99.0")
+    assert key().differences(before) == [f"python was {before.machine['python']}, is 3.99.0"]
+
+
+def test_a_recordings_key_follows_its_artifact_and_what_draws_alone() -> None:
+    artifact, other = (Key({}, {name: "1"}, {}, {}) for name in ("a.py", "b.py"))
+    module, shown = "pipeline.recording.objects", ("recording.objects",)
+    config = RunConfig()
+    key = drawing_key(config, shown, module, artifact)
+    assert "pipeline/recording/colours.py" in key.code
+    assert "rerun-sdk" in key.machine
+    assert drawing_key(config, shown, module, other).differences(key) == ["input artifact changed"]
+    fewer = RunConfig.model_validate({"recording": {"objects": 3}})
+    assert drawing_key(fewer, shown, module, artifact).differences(key) == [
+        "configuration recording.objects changed"
+    ]

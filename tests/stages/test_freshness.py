@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.execution import RunFolder
-from pipeline.execution.running import is_fresh, stage_context
+from pipeline.execution.staleness import is_fresh, stage_context
 from stages.graph import STAGES, inputs_of
 from tests.stages.conftest import ROOT
 from tests.stages.test_pipeline import digests
@@ -66,7 +66,12 @@ def test_nothing_then_touched_then_edited(project: Path) -> None:
     assert made(project) == ["evaluate"]
 
     source = project / "stages" / "shards.py"
-    source.write_text(source.read_text() + "\n# edited\n")
+    text = source.read_text()
+    assert '"""The stage\'s headline figures."""' in text
+    source.write_text(text.replace('"""The stage\'s headline', '"""All headline') + "\n# edited\n")
+    assert made(project) == []
+
+    source.write_text(source.read_text() + "\nEDITED = True\n")
     assert made(project) == ["shards", "train", "evaluate"]
     assert made(project) == []
     after = digests(folder)

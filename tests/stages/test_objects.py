@@ -7,7 +7,7 @@ import trimesh
 
 from pipeline.errors import ConfigError, MeshError
 from pipeline.execution import RunFolder, StageContext
-from pipeline.execution.running import stage_context
+from pipeline.execution.staleness import stage_context
 from pipeline.geometry.parametric import PARAMETRIC_OBJECTS
 from pipeline.messages.objects import read_objects
 from stages import objects

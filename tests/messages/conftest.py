@@ -1,0 +1,5 @@
+"""A provenance to write test files with."""
+
+from tests.artifacts.conftest import provenance
+
+__all__ = ["provenance"]
