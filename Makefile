@@ -29,7 +29,7 @@ ifeq (,$(strip $(WORKERS)))
 unexport WORKERS
 endif
 
-.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios review report export docs lint fuzz regress clean FORCE
+.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios review report export predict docs lint fuzz regress clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -117,6 +117,12 @@ report: .venv/.ready  ## the run on one page, to runs/<run>/report.html and repo
 
 export: .venv/.ready  ## dataset as FORMAT=acronym|graspgen|webdataset|parquet, to runs/<run>/export
 	@FORMAT=$(or $(FORMAT),acronym) $(PY) -m stages.export
+
+PREDICT_OPTIONS = $(foreach option,camera colour mask instances workspace depth-scale-m radius-mm tilt-deg top out,\
+  $(if $($(subst -,_,$(option))),--$(option) "$($(subst -,_,$(option)))"))
+predict: .venv/.ready  ## grasps on a real picture: DEPTH=file [camera=file mask=file tilt_deg=90 ...]
+	@test -n "$(DEPTH)" || { echo "Give the picture: make predict DEPTH=file.depth.png"; exit 1; }
+	@$(PY) -m stages.predict $(DEPTH) $(PREDICT_OPTIONS)
 
 docs: .venv/.ready  ## the pages and a reference of every module as a site, to runs/docs
 	@$(PY) -m stages.docs

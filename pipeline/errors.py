@@ -39,6 +39,10 @@ class ContentError(ArtifactError):
         super().__init__(what, remedy)
 
 
+class PictureError(SoftgripError):
+    """A picture, a point cloud or a camera's description from outside cannot be used."""
+
+
 class SceneError(SoftgripError):
     """A clutter scene misses its level's definition."""
 

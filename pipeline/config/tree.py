@@ -26,6 +26,7 @@ from pipeline.config.evaluation import EvaluateConfig, RecordingConfig
 from pipeline.config.grasps import CELL_SIDE, GraspsConfig, GripperConfig, SensingConfig
 from pipeline.config.learning import NetworkConfig, ShardsConfig, SweepConfig, TrainConfig
 from pipeline.config.objects import ObjectsConfig, SplitConfig
+from pipeline.config.predict import PredictConfig
 from pipeline.config.referee import RefereeConfig
 from pipeline.config.scenes import ScenesConfig
 from pipeline.config.section import Section
@@ -54,6 +55,7 @@ class RunConfig(Section):
     sweep: SweepConfig = SweepConfig()
     referee: RefereeConfig = RefereeConfig()
     evaluate: EvaluateConfig = EvaluateConfig()
+    predict: PredictConfig = PredictConfig()
     recording: RecordingConfig = RecordingConfig()
     dataset: DatasetConfig = DatasetConfig()
 

@@ -12,11 +12,7 @@ from pathlib import Path
 from typing import cast
 
 import numpy as np
-from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
-from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
-from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
-from google.protobuf.timestamp_pb2 import Timestamp
 
 from pipeline.artifacts.names import file_name
 from pipeline.artifacts.reading import Artifact, open_artifact
@@ -25,7 +21,7 @@ from pipeline.artifacts.writing import ArtifactWriter
 from pipeline.clutter.levels import level_of
 from pipeline.config.cameras import DepthSensor
 from pipeline.errors import ArtifactError, ContentError
-from pipeline.geometry.transforms import position_quaternion
+from pipeline.messages.foxglove import camera_calibration, frame_transforms, raw_image
 from pipeline.world.cameras import PinholeCamera
 from pipeline.world.scene import ClutterScene, PlacedObject
 from pipeline.world.view import CameraView
@@ -33,7 +29,6 @@ from schemas.softgrip.v1 import scenes_pb2
 
 TOPIC = "/scenes"
 NS_PER_SCENE = 1_000_000_000
-WORLD_FRAME = "world"
 
 # Name of an image → (encoding of foxglove.RawImage, dtype).
 IMAGES = {
@@ -49,12 +44,13 @@ def write_scene(artifact: ArtifactWriter, index: int, scene: ClutterScene, rende
     """Append scene ``index`` and its images."""
     time_ns = index * NS_PER_SCENE
     artifact.write(TOPIC, scene_message(scene, renderer), time_ns)
-    artifact.write("/tf", _transforms(scene, time_ns), time_ns)
+    artifact.write("/tf", frame_transforms(_poses(scene), time_ns), time_ns)
     for view in scene.views:
         topic = f"/scene/{view.camera.name}"
-        artifact.write(f"{topic}/calibration", _calibration(view.camera, time_ns), time_ns)
+        artifact.write(f"{topic}/calibration", camera_calibration(view.camera, time_ns), time_ns)
         for name, image in _images(view).items():
-            artifact.write(f"{topic}/{name}", _raw(image, name, view.camera, time_ns), time_ns)
+            raw = raw_image(image, *IMAGES[name], view.camera, time_ns)
+            artifact.write(f"{topic}/{name}", raw, time_ns)
 
 
 def scene_message(scene: ClutterScene, renderer: str) -> scenes_pb2.Scene:
@@ -198,48 +194,7 @@ def _images(view: CameraView) -> dict[str, np.ndarray]:
     return images
 
 
-def _raw(image: np.ndarray, name: str, camera: PinholeCamera, time_ns: int) -> RawImage:
-    encoding, dtype = IMAGES[name]
-    data = np.ascontiguousarray(image, dtype=dtype)
-    return RawImage(
-        timestamp=_stamp(time_ns),
-        frame_id=camera.name,
-        width=camera.width_px,
-        height=camera.height_px,
-        encoding=encoding,
-        step=data.strides[0],
-        data=data.tobytes(),
-    )
-
-
-def _calibration(camera: PinholeCamera, time_ns: int) -> CameraCalibration:
-    projection = np.hstack([camera.intrinsics, np.zeros((3, 1))])
-    return CameraCalibration(
-        timestamp=_stamp(time_ns),
-        frame_id=camera.name,
-        width=camera.width_px,
-        height=camera.height_px,
-        K=camera.intrinsics.ravel().tolist(),
-        R=np.eye(3).ravel().tolist(),
-        P=projection.ravel().tolist(),
-    )
-
-
-def _transforms(scene: ClutterScene, time_ns: int) -> FrameTransforms:
+def _poses(scene: ClutterScene) -> dict[str, np.ndarray]:
+    """World pose of every object and camera, by the name of its frame."""
     poses = {f"object_{p.body_id:02d}": p.world_from_object for p in scene.objects}
-    poses |= {view.camera.name: view.camera.world_from_camera for view in scene.views}
-    transforms = []
-    for name, world_from_frame in poses.items():
-        position, (w, x, y, z) = position_quaternion(world_from_frame)
-        transform = FrameTransform(
-            timestamp=_stamp(time_ns), parent_frame_id=WORLD_FRAME, child_frame_id=name
-        )
-        transform.translation.x, transform.translation.y, transform.translation.z = position
-        transform.rotation.w, transform.rotation.x = w, x
-        transform.rotation.y, transform.rotation.z = y, z
-        transforms.append(transform)
-    return FrameTransforms(transforms=transforms)
-
-
-def _stamp(time_ns: int) -> Timestamp:
-    return Timestamp(seconds=time_ns // 10**9, nanos=time_ns % 10**9)
+    return poses | {view.camera.name: view.camera.world_from_camera for view in scene.views}

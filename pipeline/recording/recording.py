@@ -46,6 +46,7 @@ TIMELINES = {
     "train": "epoch",
     "evaluate": "frame",
     "sweep": "layers",
+    "predict": "grasp",
 }
 
 

@@ -1,0 +1,1 @@
+"""Real pictures in, ranked grasps out: files, support, workspace, proposals."""

@@ -1,0 +1,278 @@
+"""Ranked grasps of real frames: contacts on what may be grasped, their q-hat, the best apart.
+
+The same pieces as in simulation: contacts along the mean surface normal (`pipeline.control`), sub
+clouds of all pictures together (`pipeline.sensing`), q-hat by a network or by another ranking.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from pipeline.camera.frame import Frame
+from pipeline.camera.support import UP_IN_CAMERA, Support, find_support, inside, level_support
+from pipeline.config import RunConfig
+from pipeline.config.evaluation import HandConfig
+from pipeline.control.candidates import Candidates, candidates_at
+from pipeline.control.clearance import free_of_collision
+from pipeline.control.cloud import Cloud, DepthPicture, merged_cloud
+from pipeline.control.ranking import Ranking
+from pipeline.errors import PictureError
+from pipeline.geometry.transforms import frame_from_z, invert, transform_points
+from pipeline.world.cameras import points_of_depth
+
+EVERY_PX = 2  # every second pixel a side is enough to find planes
+WORLD_UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Proposals:
+    """Grasps in descending order of q-hat, and why there are no more.
+
+    Attributes
+    ----------
+    world_from_contact
+        Poses, +z out of the object, shape (k, 4, 4); the frames' world.
+    quality
+        q-hat of each, shape (k,).
+    roughness_m
+        Root mean square distance of the surface around each contact from its plane, shape (k,).
+    instance
+        Label of what each lies on, 0 where frames have no labels, shape (k,).
+    support
+        What the objects stand on, None where a mask was given and no plane was found.
+    left_out
+        Reason → how many contacts were left out for it.
+    """
+
+    world_from_contact: Float[np.ndarray, "k 4 4"]
+    quality: Float[np.ndarray, " k"]
+    roughness_m: Float[np.ndarray, " k"]
+    instance: Int[np.ndarray, " k"]
+    support: Support | None
+    left_out: dict[str, int]
+
+    def __len__(self) -> int:
+        return len(self.quality)
+
+
+def propose_grasps(
+    frames: Sequence[Frame], ranking: Ranking, config: RunConfig, rng: np.random.Generator
+) -> Proposals:
+    """The best grasps of one scene seen in one or several frames.
+
+    Parameters
+    ----------
+    frames
+        Pictures of one scene; several need poses in one world.
+    ranking
+        Gives each contact a value in [0, 1].
+    config
+        The run's configuration; `predict` and the gripper's size matter.
+    rng
+        Draws contacts.
+
+    Raises
+    ------
+    PictureError
+        Several frames without poses, no support, or nothing above it.
+    """
+    if len(frames) > 1 and not all(frame.posed for frame in frames):
+        unposed = next(frame.name for frame in frames if not frame.posed)
+        raise PictureError(
+            f"{unposed} has no pose, and {len(frames)} frames are to be merged",
+            "Give world_from_camera of each frame, or one frame alone",
+        )
+    support = _support_of(frames, config, rng)
+    level = support.world_from_support if support else _upright(frames[0])
+    moved = [frame.moved(invert(level)) for frame in frames]  # from here on z = 0 is the support
+    pictures = [DepthPicture(frame.depth_m, frame.camera, frame.instances) for frame in moved]
+    graspable = [
+        DepthPicture(np.where(_graspable(frame, support, config), frame.depth_m, 0.0), frame.camera)
+        for frame in moved
+    ]
+    cloud = merged_cloud(graspable)
+    if len(cloud) == 0:
+        raise PictureError(
+            f"{frames[0].name}: nothing stands out of the support where grasps are allowed",
+            "Check mask and workspace, or lower predict.above_support_m",
+        )
+    found, left_out = _candidates(cloud, pictures, support, config, rng)
+    quality = ranking(pictures, found) if len(found) else np.empty(0)
+    kept = apart(found.world_from_contact[:, :3, 3], quality, config.predict.apart_m)
+    left_out["near a better one"] = len(quality) - len(kept)
+    best = kept[: config.predict.top]
+    poses = found.world_from_contact[best]
+    return Proposals(
+        world_from_contact=level @ poses,
+        quality=quality[best],
+        roughness_m=found.roughness_m[best],
+        instance=_instances_at(moved, poses),
+        support=support,
+        left_out={reason: number for reason, number in left_out.items() if number},
+    )
+
+
+def apart(
+    places_m: Float[np.ndarray, "k 3"], worth: Float[np.ndarray, " k"], distance_m: float
+) -> Int[np.ndarray, " j"]:
+    """Non-maximum suppression: indices, the best first, no two nearer than a distance."""
+    kept: list[int] = []
+    for i in np.argsort(-worth, kind="stable"):
+        near = np.linalg.norm(places_m[kept] - places_m[i], axis=1) < distance_m
+        if not near.any():
+            kept.append(int(i))
+    return np.array(kept, dtype=np.int64)
+
+
+def clear_of_support(
+    support_from_contact: Float[np.ndarray, "k 4 4"],
+    radius_m: float,
+    hand: HandConfig,
+    tolerance_m: float,
+) -> Bool[np.ndarray, " k"]:
+    """Whether the pad's rim and the hand's stem stay above the plane z = 0.
+
+    Parameters
+    ----------
+    support_from_contact
+        Poses of the pad at its contact, shape (k, 4, 4).
+    radius_m
+        r_G, the pad's radius [m].
+    hand
+        The stem's measures.
+    tolerance_m
+        How far below the plane a rim may be: the pad is soft, the plane measured [m].
+    """
+    height_m, cosine = support_from_contact[:, 2, 3], support_from_contact[:, 2, 2]
+    sine = np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
+    rim = height_m - radius_m * sine
+    ends = np.array([hand.stem_begins_m, hand.length_m])
+    stem = (height_m[:, None] + ends * cosine[:, None]).min(axis=1) - hand.stem_radius_m * sine
+    return np.asarray(np.minimum(rim, stem) >= -tolerance_m)
+
+
+def _support_of(
+    frames: Sequence[Frame], config: RunConfig, rng: np.random.Generator
+) -> Support | None:
+    """The support; None where there is none and every frame has a mask of its own."""
+    settings = config.predict.support
+    if settings.height_m is not None:
+        return level_support(settings.height_m)
+    points, eyes, ahead = [], [], []
+    for frame in frames:
+        found, _, _ = points_of_depth(frame.depth_m, frame.camera, EVERY_PX)
+        points.append(found)
+        pose = frame.camera.world_from_camera
+        eyes.append(np.broadcast_to(pose[:3, 3], found.shape))
+        ahead.append(np.broadcast_to(pose[:3, 2], found.shape))
+    posed = frames[0].posed
+    up = WORLD_UP if posed else UP_IN_CAMERA
+    try:
+        return find_support(
+            np.concatenate(points),
+            np.concatenate(eyes),
+            np.concatenate(ahead),
+            up,
+            posed,
+            settings,
+            rng,
+        )
+    except PictureError as error:
+        if all(not frame.allowed.all() for frame in frames):
+            return None
+        raise PictureError(f"{frames[0].name}: {error.what}", error.remedy) from error
+
+
+def _upright(frame: Frame) -> Float[np.ndarray, "4 4"]:
+    """A frame of the world for a scene without a support: z up, below all that was measured."""
+    points, _, _ = points_of_depth(frame.depth_m, frame.camera, EVERY_PX)
+    up = WORLD_UP if frame.posed else UP_IN_CAMERA
+    lowest = float((points @ up).min()) - 1.0
+    return frame_from_z(up * lowest, up)
+
+
+def _graspable(frame: Frame, support: Support | None, config: RunConfig) -> Bool[np.ndarray, "h w"]:
+    """Pixels that are allowed and show what stands out of the support, within its walls."""
+    settings = config.predict
+    points, rows, columns = points_of_depth(frame.depth_m, frame.camera, 1)
+    chosen = frame.allowed[rows, columns]
+    if support is not None:
+        eye = frame.camera.world_from_camera[:3, 3]
+        distance_m = np.linalg.norm(points - eye, axis=1)
+        least = np.maximum(settings.above_support_m, settings.above_support_share * distance_m)
+        chosen &= (points[:, 2] > least) & inside(support, points, settings.support)
+    picture = np.zeros(frame.depth_m.shape, dtype=bool)
+    picture[rows[chosen], columns[chosen]] = True
+    return picture
+
+
+def _candidates(
+    cloud: Cloud,
+    pictures: Sequence[DepthPicture],
+    support: Support | None,
+    config: RunConfig,
+    rng: np.random.Generator,
+) -> tuple[Candidates, dict[str, int]]:
+    """Contacts on what may be grasped, clear of all that was measured."""
+    settings, hand = config.predict, config.evaluate.hand
+    at = rng.integers(len(cloud), size=settings.candidates)
+    found = candidates_at(
+        cloud,
+        cloud.points_m[at],
+        cloud.eye_m[at],
+        config.grasps.normal_radius_m,
+        settings.tilt_max_rad,
+    )
+    left_out: Counter[str] = Counter()
+    left_out["too steep, or too small a surface"] = settings.candidates - len(found)
+    obstacles = merged_cloud(pictures)
+    free = free_of_collision(found.world_from_contact, obstacles.points_m, hand)
+    left_out["hand or stem would meet something"] = int((~free).sum())
+    if support is not None:
+        clear = clear_of_support(
+            found.world_from_contact,
+            config.gripper.pad.radius_m,
+            hand,
+            settings.above_support_m,
+        )
+        left_out["pad or stem would meet the support"] = int((free & ~clear).sum())
+        free &= clear
+    return found.take(free), dict(left_out)
+
+
+def _instances_at(
+    frames: Sequence[Frame], poses: Float[np.ndarray, "k 4 4"]
+) -> Int[np.ndarray, " k"]:
+    """The label under each contact in the first frame with labels that shows it."""
+    labels = np.zeros(len(poses), dtype=np.int64)
+    for frame in frames:
+        if frame.instances is None:
+            continue
+        pixel, seen = pixels_of(frame, poses[:, :3, 3])
+        new = seen & (labels == 0)
+        labels[new] = frame.instances[pixel[new, 1], pixel[new, 0]]
+    return labels
+
+
+def pixels_of(
+    frame: Frame, points_m: Float[np.ndarray, "k 3"], within: bool = True
+) -> tuple[Int[np.ndarray, "k 2"], Bool[np.ndarray, " k"]]:
+    """Column and row of points of the frame's world, and whether they lie in its picture.
+
+    within : whether the picture's edges count; else all that lies ahead of the camera does.
+    """
+    local = transform_points(invert(frame.camera.world_from_camera), points_m)
+    k = frame.camera.intrinsics
+    depth = np.where(local[:, 2] > 0, local[:, 2], np.inf)
+    pixel = np.floor(local[:, :2] / depth[:, None] * k[[0, 1], [0, 1]] + k[:2, 2]).astype(np.int64)
+    ahead = local[:, 2] > 0
+    size = np.array([frame.camera.width_px, frame.camera.height_px])
+    return pixel, ahead & ((pixel >= 0) & (pixel < size)).all(axis=1) if within else ahead
+
+
+def approach_of(world_from_contact: Float[np.ndarray, "k 4 4"]) -> Float[np.ndarray, "k 3"]:
+    """Which way the gripper moves at each contact: -z of GCS, unit vectors in the world."""
+    return -world_from_contact[:, :3, 2]

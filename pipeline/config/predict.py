@@ -1,0 +1,101 @@
+"""[predict]: real pictures in, ranked grasps out."""
+
+import math
+from typing import Self
+
+from pydantic import Field, model_validator
+
+from pipeline.config.section import Section
+
+
+class SupportConfig(Section):
+    """How the table, or the floor and walls of a bin, are found in a picture."""
+
+    tolerance: float = Field(
+        0.008,
+        gt=0,
+        lt=0.1,
+        description="distance from a plane that still lies on it, as a share of the distance from "
+        "the camera: consumer depth cameras err by 2 to 5 mm at 0.6 m [1]",
+    )
+    smallest_share: float = Field(
+        0.01, gt=0, le=1, description="least share of the points that makes a plane, a wall [1]"
+    )
+    support_share: float = Field(
+        0.04, gt=0, le=1, description="least share of the points that makes a support [1]"
+    )
+    below_max_share: float = Field(
+        0.1, ge=0, le=1, description="of all points, how many may lie under the support [1]"
+    )
+    up_known_rad: float = Field(
+        math.radians(12), gt=0, le=math.pi / 2, description="the support's tilt, pose known [rad]"
+    )
+    up_guessed_rad: float = Field(
+        math.radians(50),
+        gt=0,
+        le=math.pi / 2,
+        description="angle of the support to the guess of up: a camera that looks 5 to 90 degrees "
+        "down [rad]",
+    )
+    wall_lean_rad: float = Field(
+        math.radians(30), ge=0, lt=math.pi / 2, description="lean of a wall off the upright [rad]"
+    )
+    wall_inner_share: float = Field(
+        0.6, ge=0.5, le=1, description="share of the points on a wall's inner side [1]"
+    )
+    wall_span_share: float = Field(
+        0.5, gt=0, le=1, description="length of a wall over that of all that was measured [1]"
+    )
+    wall_margin_m: float = Field(
+        0.012, ge=0, description="what lies this near to a wall belongs to it [m]"
+    )
+    rim_m: float = Field(
+        0.035,
+        ge=0,
+        description="a bin's rim is at most so wide, and its height is known to within so much [m]",
+    )
+    piece_gap_m: float = Field(
+        0.015, gt=0, description="a gap this wide parts the support, as between two bins [m]"
+    )
+    outline_margin_m: float = Field(
+        0.01, ge=0, description="objects may stand out so far over the support's edge [m]"
+    )
+    height_m: float | None = Field(
+        None, description="height of a level support in the world, where it is known [m]"
+    )
+
+
+class PredictConfig(Section):
+    """From a real picture to ranked grasps."""
+
+    candidates: int = Field(512, ge=1, le=8192, description="contacts that are tried a picture")
+    top: int = Field(20, ge=1, le=1000, description="grasps that are given out")
+    apart_m: float = Field(
+        0.02,
+        ge=0,
+        description="non-maximum suppression: grasps are at least so far apart; SuctionNet [m]",
+    )
+    tilt_max_rad: float = Field(
+        math.radians(50),
+        gt=0,
+        le=math.pi,
+        description="approach off the vertical; over 90 degrees from the side [rad]",
+    )
+    above_support_m: float = Field(
+        0.006, ge=0, description="what lies lower may be the support itself [m]"
+    )
+    above_support_share: float = Field(
+        0.012,
+        ge=0,
+        description="the same as a share of the distance from the camera, whichever is more [1]",
+    )
+    quality_min: float = Field(
+        0.3, ge=0, le=1, description="under this q-hat no grasp is called good [1]"
+    )
+    support: SupportConfig = SupportConfig()
+
+    @model_validator(mode="after")
+    def _top_are_among_the_candidates(self) -> Self:
+        if self.top > self.candidates:
+            raise ValueError("top must not exceed candidates")
+        return self

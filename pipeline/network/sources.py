@@ -1,0 +1,103 @@
+"""What predicts quality: the released network, a file of one's own, or the analytic baseline."""
+
+import hashlib
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from pipeline.config.grasps import GripperConfig
+from pipeline.errors import ArtifactError, ContentError
+from pipeline.network.analytic import AnalyticBaseline
+from pipeline.network.baselines import MonotoneRegressor
+from pipeline.network.control_inference import ControlPredictor
+
+RELEASED, ANALYTIC = "released", "analytic"
+RELEASED_FOLDER = Path(__file__).parent / "released"
+EXPORT_FILE, BASELINE_FILE = "ga_cnn.onnx", "analytic.json"
+
+Predict = Callable[
+    [Float[np.ndarray, "n g g 3"], Bool[np.ndarray, "n g g"]], Float[np.ndarray, " n"]
+]
+
+
+@dataclass(frozen=True)
+class QualitySource:
+    """Something that gives q-hat for clouds.
+
+    Attributes
+    ----------
+    name
+        What people are told.
+    predict
+        Clouds in units of r_G, shape (n, g, g, 3), and masks → q-hat, shape (n,).
+    digest
+        SHA-256 of the file it came from.
+    """
+
+    name: str
+    predict: Predict
+    digest: str
+
+
+def quality_source(named: str, gripper: GripperConfig, threads: int) -> QualitySource:
+    """What a person named: ``released``, ``analytic``, or the path of an exported network.
+
+    Parameters
+    ----------
+    named
+        One of the words, or a path of an ``.onnx`` file that stage train wrote.
+    gripper
+        Pad and physics, for the analytic baseline.
+    threads
+        Of the CPU, for a network.
+
+    Raises
+    ------
+    ArtifactError
+        The file is not there, or is no network of this project.
+    """
+    if named == ANALYTIC:
+        data = _bytes(RELEASED_FOLDER / BASELINE_FILE)
+        baseline = baseline_from_json(data.decode(), gripper)
+        return QualitySource(ANALYTIC, baseline.predict, hashlib.sha256(data).hexdigest())
+    path = RELEASED_FOLDER / EXPORT_FILE if named == RELEASED else Path(named)
+    data = _bytes(path)
+    try:
+        predictor = ControlPredictor(data, threads)
+    except ContentError as error:
+        raise ArtifactError(f"{path}: {error.what}", error.remedy) from error
+    name = "the released network" if named == RELEASED else path.name
+    return QualitySource(name, predictor.predict, hashlib.sha256(data).hexdigest())
+
+
+def baseline_to_json(baseline: AnalyticBaseline) -> str:
+    """What was chosen on training samples, without pad and physics."""
+    chosen = {
+        "tolerance": baseline.tolerance,
+        "smoothing": baseline.smoothing,
+        "label": baseline.scale.feature.tolist(),
+        "quality": baseline.scale.quality.tolist(),
+    }
+    return json.dumps(chosen, indent=1) + "\n"
+
+
+def baseline_from_json(text: str, gripper: GripperConfig) -> AnalyticBaseline:
+    """Read back `baseline_to_json`, for a gripper."""
+    chosen = json.loads(text)
+    scale = MonotoneRegressor(np.array(chosen["label"]), np.array(chosen["quality"]))
+    return AnalyticBaseline(gripper, chosen["tolerance"], chosen["smoothing"], scale)
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise ArtifactError(
+            f"{path} cannot be read: {error.strerror}",
+            f"Give an exported network (runs/<run>/train/{EXPORT_FILE}), '{RELEASED}' or "
+            f"'{ANALYTIC}'",
+        ) from error
