@@ -71,11 +71,12 @@ def _from_ply(path: Path) -> np.ndarray:
 
 def _from_pcd(path: Path) -> np.ndarray:
     try:
-        return np.asarray(PointCloud.from_path(path).numpy(("x", "y", "z")), dtype=np.float64)
+        points: Float[np.ndarray, "n 3"] = PointCloud.from_path(path).numpy(("x", "y", "z"))
     except (ValueError, KeyError, OSError, RuntimeError, UnicodeDecodeError) as error:
         raise PictureError(
             f"{path} cannot be read as a PCD point cloud: {error}", "Write it again"
         ) from error
+    return points
 
 
 def _from_numpy(path: Path) -> np.ndarray:

@@ -214,7 +214,8 @@ def _walls(
     side, with the place looked at. The face of a box is upright too, but short.
     """
     ground = local_m[:, 2] > -near_m
-    walls, outsides = [], []
+    walls: list[Plane] = []
+    outsides: list[Plane] = []
     for plane in others:
         normal = rotate_vectors(to_support, plane.normal)
         if abs(normal[2]) > np.sin(config.wall_lean_rad):
