@@ -39,7 +39,8 @@ def read_cloud_m(path: Path, scale_m: float | None) -> Float[np.ndarray, "n 3"]:
             f"{path} holds an array of shape {raw.shape}, not points of three coordinates",
             "Give an array (n, 3), or (h, w, 3)",
         )
-    points = raw[:, :3].astype(np.float64) * (1.0 if scale_m is None else scale_m)
+    points: Float[np.ndarray, "n 3"] = raw[:, :3].astype(np.float64)
+    points = points * (1.0 if scale_m is None else scale_m)
     points = points[np.isfinite(points).all(axis=1)]
     points = points[(points != 0).any(axis=1)]  # drivers write unmeasured pixels as the origin
     if len(points) < FEWEST_POINTS:
