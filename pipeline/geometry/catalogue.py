@@ -100,7 +100,8 @@ def measure_object(source: MeshSource, config: ObjectsConfig) -> MeasuredObject:
     """Repair and NSVR. Raises MeshError where the source must be refused."""
     mesh, repairs = repair(source.label, source.mesh, config.max_hole_fraction)
     value = nsvr(mesh)
-    return MeasuredObject(source, mesh, repairs, value, shape_class(value), describe(mesh))
+    changes = (*source.notes, *repairs)
+    return MeasuredObject(source, mesh, changes, value, shape_class(value), describe(mesh))
 
 
 def finish_object(

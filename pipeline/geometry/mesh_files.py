@@ -1,46 +1,27 @@
-"""Reading mesh files: bounded, without following references, units declared or detected."""
+"""Reading mesh files: bounded, nothing outside their folder, units declared or detected."""
 
 import hashlib
-import io
-import struct
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Literal
-
-import numpy as np
-import trimesh
+from urllib.parse import unquote
 
 from pipeline.config.objects import ObjectsConfig
 from pipeline.errors import MeshError
+from pipeline.geometry.file_kinds import check_kind
+from pipeline.geometry.formats import gltf, obj, off, ply, stl
+from pipeline.geometry.formats.surface import Surface, check_faces_allowed
 from pipeline.geometry.mesh import Mesh
-from pipeline.geometry.mesh_headers import check_face_count, check_faces_allowed, check_header
 
 UnitSource = Literal["declared", "configured", "detected"]
 
 _METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 # Millimetres before centimetres: most tools for design write them.
 _DETECTION_ORDER = ("m", "mm", "cm")
-_UNIT_NAMES = {
-    **{"meters": "m", "meter": "m", "metres": "m", "metre": "m", "m": "m"},
-    **{"centimeters": "cm", "centimeter": "cm", "cm": "cm"},
-    **{"millimeters": "mm", "millimeter": "mm", "mm": "mm"},
-    **{"inches": "in", "inch": "in", "in": "in"},
-}
-# What a parser may raise on a damaged file, as seen on truncated, bit-flipped and fuzzed files.
-_PARSER_ERRORS = (
-    LookupError,
-    ValueError,
-    TypeError,
-    AttributeError,
-    NameError,
-    RecursionError,
-    ArithmeticError,
-    AssertionError,
-    RuntimeError,
-    MemoryError,
-    EOFError,
-    struct.error,
-)
+# Formats whose reader needs the file's bytes alone; glTF may name further files.
+_READERS = {".obj": obj.read, ".off": off.read, ".ply": ply.read, ".stl": stl.read}
+_GLTF_SUFFIXES = (".glb", ".gltf")
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,27 +38,54 @@ class MeshSource:
     unit: str
     """Length unit of the source: m, cm, mm or in."""
     unit_known_by: UnitSource
+    notes: tuple[str, ...] = ()
+    """What the object's record should say of how the file was read."""
 
 
 def load_mesh_file(path: Path, folder: Path, name: str, config: ObjectsConfig) -> MeshSource:
     """One file's surface in metres, its scene's nodes merged into one mesh.
 
-    Raises MeshError, naming the file and the reason, where the file leads out of the folder, is
-    too large, no mesh, damaged, has no or too many faces, vertices that are not finite, indices
-    out of range, or a size that no unit explains.
+    Parameters
+    ----------
+    path
+        The mesh file.
+    folder
+        The folder of meshes; nothing outside it is read.
+    name
+        The object's name.
+    config
+        Bounds on file, faces and size, and the unit where no file declares one.
+
+    Raises
+    ------
+    MeshError
+        With the file's name and the true reason, where the file leads out of the folder, is too
+        large, no mesh, damaged, has no or too many faces, vertices that are not finite, indices
+        out of range, faces that cannot be cut, or a size that no unit explains.
     """
     label = path.relative_to(folder).as_posix()
-    raw, declared, data = read_raw_mesh(path, folder, config)
-    unit, known_by = length_unit(label, float(raw.extents_m.max()), declared, config)
+    surface, digest = read_surface(path, folder, config)
+    raw = surface.mesh
+    unit, known_by = length_unit(label, float(raw.extents_m.max()), surface.unit, config)
     mesh = Mesh(raw.vertices_m * _METRES_PER_UNIT[unit], raw.faces)
-    return MeshSource(name, label, hashlib.sha256(data).hexdigest(), mesh, unit, known_by)
+    return MeshSource(name, label, digest, mesh, unit, known_by, surface.notes)
 
 
-def read_raw_mesh(
-    path: Path, folder: Path, config: ObjectsConfig
-) -> tuple[Mesh, str | None, bytes]:
-    """A file's checked surface in its own unit, the unit it declares, if any, and its bytes."""
+def read_surface(path: Path, folder: Path, config: ObjectsConfig) -> tuple[Surface, str]:
+    """A file's checked surface in its own unit, and the digest of all bytes it is made of."""
     label = path.relative_to(folder).as_posix()
+    data = _bytes_of(label, path, folder, config)
+    surface = parse_mesh(label, data, config, path, folder)
+    if len(surface.mesh.faces) == 0:
+        raise MeshError(f"{label} has no faces of three or more corners", "Export its surface")
+    check_faces_allowed(label, len(surface.mesh.faces), config.max_faces)
+    digest = hashlib.sha256(data)
+    for more in surface.beside:
+        digest.update(more)
+    return surface, digest.hexdigest()
+
+
+def _bytes_of(label: str, path: Path, folder: Path, config: ObjectsConfig) -> bytes:
     if not path.resolve().is_relative_to(folder.resolve()):
         raise MeshError(f"{label} leads out of its folder", "Copy the mesh into the folder")
     mebibytes = path.stat().st_size / 2**20
@@ -86,59 +94,42 @@ def read_raw_mesh(
             f"{label} has {mebibytes:.0f} MiB, more than the {config.max_file_mib} allowed",
             "Simplify the mesh, or raise objects.max_file_mib",
         )
-    data = path.read_bytes()
-    check_header(label, data, config.max_faces)
-    raw, declared = parse_mesh(label, data, config.max_faces)
-    check_face_count(label, data, len(raw.faces))
-    check_arrays(label, raw, config.max_faces)
-    return raw, declared, data
+    return path.read_bytes()
 
 
-def parse_mesh(label: str, data: bytes, max_faces: int) -> tuple[Mesh, str | None]:
-    """The mesh in the file's own unit, and the unit it declares, if any.
+def parse_mesh(label: str, data: bytes, config: ObjectsConfig, path: Path, folder: Path) -> Surface:
+    """The surface in the file's own unit, by the reader of its suffix.
 
-    Nothing else is opened: material files and textures that the mesh refers to, or holds, stay
-    unread.
+    Of further files only those are read that a glTF keeps its data in: materials and textures
+    stay unread. Raises MeshError.
     """
-    suffix = Path(label).suffix.lower()
-    options = {"skip_materials": True} if suffix in (".obj", ".ply", ".glb") else {}
-    try:
-        scene = trimesh.load_scene(
-            io.BytesIO(data), file_type=suffix[1:], process=False, allow_remote=False, **options
-        )
-        # A part may be placed any number of times, and each time is a copy.
-        placed = [scene.geometry[scene.graph[node][1]] for node in scene.graph.nodes_geometry]
-        faces_placed = sum(len(getattr(part, "faces", ())) for part in placed)
-        check_faces_allowed(label, faces_placed, max_faces)
-        merged = scene.to_mesh()
-        vertices = np.array(merged.vertices, dtype=np.float64).reshape(-1, 3)
-        faces = np.array(merged.faces, dtype=np.int64).reshape(-1, 3)
-    except _PARSER_ERRORS as error:
-        reason = f"{type(error).__name__}: {error}".rstrip(": ")
-        raise MeshError(
-            f"{label} cannot be read as {suffix[1:].upper()} ({reason})",
-            "Export the mesh again, or fetch the file again",
-        ) from error
-    units = "m" if suffix == ".glb" else _UNIT_NAMES.get(str(scene.units).lower())
-    return Mesh(vertices, faces), units
+    suffix = path.suffix.lower()
+    check_kind(label, data)
+    if suffix in _GLTF_SUFFIXES:
+        beside = partial(_beside, label, path, folder, config)
+        return gltf.read(label, data, config.max_faces, beside)
+    return _READERS[suffix](label, data, config.max_faces)
 
 
-def check_arrays(label: str, mesh: Mesh, max_faces: int) -> None:
-    """Raise MeshError for no or too many faces, bad indices, or vertices that are not finite."""
-    if len(mesh.faces) == 0 or len(mesh.vertices_m) == 0:
-        raise MeshError(f"{label} has no faces", "A point cloud must be meshed first")
-    if len(mesh.faces) > max_faces:
+def _beside(label: str, path: Path, folder: Path, config: ObjectsConfig, name: str) -> bytes:
+    """The bytes of a file that a glTF names. Raises MeshError where it is none of the folder's."""
+    if ":" in name:
         raise MeshError(
-            f"{label} has {len(mesh.faces)} faces, more than the {max_faces} allowed",
-            "Simplify the mesh, or raise objects.max_faces",
+            f"{label} keeps its data at '{name[:80]}', and only files of its folder are read "
+            "(no http, https or file addresses)",
+            "Export it as one GLB file",
         )
-    if mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices_m):
+    found = path.parent / unquote(name)
+    if not found.resolve().is_relative_to(folder.resolve()):
         raise MeshError(
-            f"{label} has faces that refer to vertices it does not have", "Export the mesh again"
+            f"{label} keeps its data in '{name[:80]}', which leads out of its folder",
+            "Copy that file into the folder",
         )
-    bad = int((~np.isfinite(mesh.vertices_m)).any(axis=1).sum())
-    if bad:
-        raise MeshError(f"{label} has {bad} vertices that are NaN or infinite", "Mend the mesh")
+    if not found.is_file():
+        raise MeshError(
+            f"{label} keeps its data in '{name[:80]}', which is not there", "Put it there"
+        )
+    return _bytes_of(f"{label}: '{name[:80]}'", found, folder, config)
 
 
 def length_unit(

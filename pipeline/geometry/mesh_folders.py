@@ -8,7 +8,7 @@ from pathlib import Path
 
 from pipeline.errors import MeshError
 
-MESH_SUFFIXES = (".glb", ".obj", ".off", ".ply", ".stl")
+MESH_SUFFIXES = (".glb", ".gltf", ".obj", ".off", ".ply", ".stl")
 FAMILIES_FILE = "families.toml"  # what a person declares to be alike
 SOURCE_SUFFIXES = (*MESH_SUFFIXES, ".urdf")  # a URDF places meshes of the folder at a scale
 

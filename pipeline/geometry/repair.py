@@ -10,6 +10,7 @@ from pipeline.geometry import topology
 from pipeline.geometry.manifolds import from_manifold, to_manifold
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.shape import surface_area, volume
+from pipeline.geometry.welding import weld
 
 # Vertices nearer than this share of the longest extent are one vertex written twice.
 _MERGE_SHARE = 1e-7
@@ -44,14 +45,11 @@ def repair(label: str, mesh: Mesh, max_hole_fraction: float) -> tuple[Mesh, tupl
 
 def _merge_vertices(mesh: Mesh, done: list[str]) -> Mesh:
     tolerance = _MERGE_SHARE * float(mesh.extents_m.max())
-    lower = mesh.vertices_m.min(axis=0)
-    cells = np.round((mesh.vertices_m - lower) / max(tolerance, 1e-300)).astype(np.int64)
-    _, first, inverse = np.unique(cells, axis=0, return_index=True, return_inverse=True)
-    merged = len(mesh.vertices_m) - len(first)
-    if merged == 0:
+    first, merged = weld(mesh.vertices_m, tolerance)
+    if len(first) == len(mesh.vertices_m):
         return mesh
-    done.append(f"merged {merged} duplicate vertices")
-    return Mesh(mesh.vertices_m[first], inverse.reshape(-1)[mesh.faces])
+    done.append(f"merged {len(mesh.vertices_m) - len(first)} duplicate vertices")
+    return Mesh(mesh.vertices_m[first], merged[mesh.faces])
 
 
 def _drop_bad_faces(mesh: Mesh, done: list[str]) -> Mesh:

@@ -18,9 +18,10 @@ def undirected_edge_counts(
     faces: Int[np.ndarray, "m 3"],
 ) -> tuple[Int[np.ndarray, "u 2"], Int[np.ndarray, " u"]]:
     """Each edge once, and how many faces use it."""
-    edges = np.sort(directed_edges(faces), axis=1)
-    unique, counts = np.unique(edges, axis=0, return_counts=True)
-    return unique, counts
+    edges = np.sort(directed_edges(faces), axis=1).astype(np.int64)
+    width = int(edges.max(initial=0)) + 1
+    keys, counts = np.unique(edges[:, 0] * width + edges[:, 1], return_counts=True)
+    return np.stack([keys // width, keys % width], axis=1), counts
 
 
 def boundary_edges(faces: Int[np.ndarray, "m 3"]) -> Int[np.ndarray, "b 2"]:
@@ -78,10 +79,14 @@ def is_connected(mesh: Mesh) -> bool:
 
 def is_closed(mesh: Mesh) -> bool:
     """Every edge has exactly two faces, which pass along it in opposite directions."""
-    edges = directed_edges(mesh.faces)
-    _, counts = undirected_edge_counts(mesh.faces)
-    unique_directed = len(np.unique(edges, axis=0)) == len(edges)
-    return bool(len(counts) > 0 and (counts == 2).all() and unique_directed)
+    start, end = directed_edges(mesh.faces).astype(np.int64).T
+    if len(start) == 0 or (start == end).any():
+        return False
+    width = int(mesh.faces.max()) + 1
+    forward = np.sort(start * width + end)
+    backward = np.sort(end * width + start)
+    # Each edge once in each direction, and none twice in one.
+    return bool((forward == backward).all() and (forward[1:] != forward[:-1]).all())
 
 
 def submesh(mesh: Mesh, face_index: Int[np.ndarray, " k"]) -> Mesh:

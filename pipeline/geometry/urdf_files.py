@@ -5,7 +5,9 @@ for beside the URDF and in its folder, never outside; URDF is in metres by its d
 """
 
 import hashlib
+import re
 from pathlib import Path
+from urllib.parse import unquote
 from xml.etree import ElementTree
 
 import numpy as np
@@ -15,19 +17,14 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.config.objects import ObjectsConfig
 from pipeline.errors import MeshError
+from pipeline.geometry.formats.surface import check_faces_allowed, check_finite
 from pipeline.geometry.mesh import Mesh
-from pipeline.geometry.mesh_files import (
-    MeshSource,
-    check_arrays,
-    length_unit,
-    load_mesh_file,
-    read_raw_mesh,
-)
+from pipeline.geometry.mesh_files import MeshSource, length_unit, load_mesh_file, read_surface
 from pipeline.geometry.mesh_folders import MESH_SUFFIXES
-from pipeline.geometry.mesh_headers import check_faces_allowed
 
 URDF_SUFFIX = ".urdf"
-_PACKAGE = "package://"
+_PACKAGES = ("package://", "model://")  # of ROS and of Gazebo
+_SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:")  # longer than the letter of a drive
 _LARGEST_URDF_MIB = 16  # a URDF names meshes and holds none
 
 
@@ -67,6 +64,7 @@ def load_urdf_file(path: Path, folder: Path, name: str, config: ObjectsConfig) -
     root = _root(path, folder)
     digest = hashlib.sha256(path.read_bytes())
     parts: list[Mesh] = []
+    notes: list[str] = []
     faces = 0
     for link, root_from_link in _placed_links(label, root):
         bodies = link.findall("visual") or link.findall("collision")
@@ -74,8 +72,9 @@ def load_urdf_file(path: Path, folder: Path, name: str, config: ObjectsConfig) -
             geometry = body.find("geometry")
             if geometry is None or not len(geometry):
                 raise MeshError(f"{label} has a link without geometry", "Export it again")
-            mesh, data = _shape(label, geometry[0], path, folder, config)
-            digest.update(data)
+            mesh, held, said = _shape(label, geometry[0], path, folder, config)
+            digest.update(held.encode())
+            notes += [note for note in said if note not in notes]
             faces += len(mesh.faces)
             check_faces_allowed(label, faces, config.max_faces)
             parts.append(mesh.transformed(root_from_link @ _origin(label, body)))
@@ -86,9 +85,9 @@ def load_urdf_file(path: Path, folder: Path, name: str, config: ObjectsConfig) -
         np.concatenate([part.vertices_m for part in parts]),
         np.concatenate([part.faces + at for part, at in zip(parts, starts, strict=True)]),
     )
-    check_arrays(label, merged, config.max_faces)
+    check_finite(label, merged.vertices_m)
     unit, known_by = length_unit(label, float(merged.extents_m.max()), "m", config)
-    return MeshSource(name, label, digest.hexdigest(), merged, unit, known_by)
+    return MeshSource(name, label, digest.hexdigest(), merged, unit, known_by, tuple(notes))
 
 
 def _root(path: Path, folder: Path) -> ElementTree.Element:
@@ -103,24 +102,32 @@ def _root(path: Path, folder: Path) -> ElementTree.Element:
         raise MeshError(f"{label} is no XML ({error})", "Export the URDF again") from error
     if root.tag != "robot":
         raise MeshError(f"{label} is no URDF: its root is <{root.tag}>", "Export the URDF again")
+    if any("xacro" in element.tag for element in root.iter()):
+        raise MeshError(
+            f"{label} holds macros of xacro", "Expand it: xacro robot.xacro > robot.urdf"
+        )
     return root
 
 
 def _placed_links(
     label: str, root: ElementTree.Element
 ) -> list[tuple[ElementTree.Element, Float[np.ndarray, "4 4"]]]:
-    """Every link with its pose in the root link."""
+    """Every link with its pose in the root link, joints at their zero position."""
     links = {link.get("name", ""): link for link in root.findall("link")}
     above: dict[str, tuple[str, np.ndarray]] = {}
+    moving: dict[str, str] = {}  # the kind of the joint above a link, where it is not fixed
     for joint in root.findall("joint"):
         kind, parent, child = joint.get("type"), joint.find("parent"), joint.find("child")
         if parent is None or child is None:
             raise MeshError(f"{label} has a joint without parent or child", "Export it again")
         if kind != "fixed":
-            raise MeshError(
-                f"{label} has a {kind} joint, and an object must be rigid",
-                "Fix the joint at the wanted pose, or export its links one by one",
-            )
+            moving[child.get("link", "")] = str(kind)
+        for end in (parent, child):
+            if end.get("link") not in links:
+                raise MeshError(
+                    f"{label} has a joint to link '{end.get('link')}', which it does not have",
+                    "Mend its joints",
+                )
         above[child.get("link", "")] = (parent.get("link", ""), _origin(label, joint))
     placed: dict[str, Float[np.ndarray, "4 4"]] = {}
     for name in links:
@@ -133,13 +140,48 @@ def _placed_links(
         pose = placed.setdefault(at, np.eye(4))
         for below in reversed(chain):
             pose = placed[below] = pose @ above[below][1]
+    _check_rigid(label, links, {child: parent for child, (parent, _) in above.items()}, moving)
     return [(link, placed[name]) for name, link in links.items()]
+
+
+def _check_rigid(
+    label: str,
+    links: dict[str, ElementTree.Element],
+    parents: dict[str, str],
+    moving: dict[str, str],
+) -> None:
+    """Raise MeshError where a joint that moves parts two links that both have geometry.
+
+    A link without geometry is a frame, such as the world that an object floats in: a joint to it
+    moves the object as a whole.
+    """
+    # In one tree, the shapes that move together hang below one and the same joint that moves.
+    carriers: dict[str, tuple[str, str]] = {}
+    first: dict[str, str] = {}
+    for name, link in links.items():
+        chain, at = list[str](), name
+        while at not in carriers and at in parents:
+            chain.append(at)
+            at = parents[at]
+        carrier, tree = carriers.setdefault(at, (at, at))
+        for below in reversed(chain):
+            carrier = below if below in moving else carrier
+            carriers[below] = (carrier, tree)
+        if link.find("visual") is None and link.find("collision") is None:
+            continue
+        other = first.setdefault(tree, carrier)
+        if other != carrier:
+            kind = moving.get(carrier) or moving[other]
+            raise MeshError(
+                f"{label} has a {kind} joint, and an object must be rigid",
+                "Fix the joint at the wanted pose, or export its links one by one",
+            )
 
 
 def _shape(
     label: str, shape: ElementTree.Element, urdf: Path, folder: Path, config: ObjectsConfig
-) -> tuple[Mesh, bytes]:
-    """A geometry's surface in its own frame, and the bytes of the file it came from."""
+) -> tuple[Mesh, str, tuple[str, ...]]:
+    """A geometry's surface in its own frame, its file's digest, and what its reading noted."""
     if shape.tag == "mesh":
         reference = shape.get("filename", "")
         path = _resolved(reference, urdf, folder)
@@ -148,13 +190,14 @@ def _shape(
                 f"{label} places '{reference}', which is none of {', '.join(MESH_SUFFIXES)}",
                 "Export that mesh as OBJ",
             )
-        raw, _, data = read_raw_mesh(path, folder.resolve(), config)
+        surface, digest = read_surface(path, folder.resolve(), config)
+        raw = surface.mesh
         scale = _numbers(label, shape.get("scale", "1 1 1"), 3)
         if not (scale != 0).all():
             raise MeshError(f"{label} scales '{reference}' to nothing", "Change its scale")
         # A mirrored mesh is turned inside out, unless its faces run the other way round.
         faces = raw.faces if scale.prod() > 0 else raw.faces[:, ::-1]
-        return Mesh(raw.vertices_m * scale, faces), data
+        return Mesh(raw.vertices_m * scale, faces), digest, surface.notes
     if shape.tag == "box":
         solid = trimesh.creation.box(extents=_numbers(label, shape.get("size", ""), 3))
     elif shape.tag == "sphere":
@@ -166,20 +209,22 @@ def _shape(
         solid = trimesh.creation.cylinder(radius=radius, height=length, sections=64)
     else:
         raise MeshError(f"{label} has a <{shape.tag}>, which URDF does not know", "Use a mesh")
-    return Mesh(np.array(solid.vertices), np.array(solid.faces, dtype=np.int64)), b""
+    return Mesh(np.array(solid.vertices), np.array(solid.faces, dtype=np.int64)), "", ()
 
 
 def _resolved(reference: str, urdf: Path, folder: Path) -> Path:
     """The file that a URDF names. Raises MeshError where it is missing or outside the folder.
 
-    A ``package://`` may stand for the URDF's folder or for the whole folder, with or without the
-    package's name.
+    A ``package://`` may stand for any folder from the URDF's up to the folder of meshes, with or
+    without the package's name; a path may have backslashes and percent escapes.
     """
     label, root = urdf.relative_to(folder).as_posix(), folder.resolve()
-    name = reference.removeprefix(_PACKAGE)
-    inner = name.partition("/")[2] if reference.startswith(_PACKAGE) else name
-    candidates = [base / part for part in (name, inner) for base in (urdf.parent, folder)]
-    found = [path.resolve() for path in candidates if path.is_file()]
+    if not reference.strip():
+        raise MeshError(f"{label} has a mesh that names no file", "Export the URDF again")
+    bases = [urdf.parent, *(up for up in urdf.parent.parents if up.is_relative_to(folder))]
+    written = _paths_meant(label, reference)
+    candidates = [base / part for part in written for base in bases]
+    found = [path.resolve() for path in candidates if _is_file(path)]
     if not found:
         raise MeshError(f"{label} places '{reference}', which is not there", "Put it there")
     inside = [path for path in found if path.is_relative_to(root)]
@@ -189,6 +234,37 @@ def _resolved(reference: str, urdf: Path, folder: Path) -> Path:
             "Copy the mesh into the folder",
         )
     return inside[0]
+
+
+def _paths_meant(label: str, reference: str) -> list[str]:
+    """Paths that a reference may mean: as it is written first, then without escapes."""
+    package = next((kind for kind in _PACKAGES if reference.startswith(kind)), None)
+    if package:
+        names = [reference.removeprefix(package)]
+        names.append(names[0].partition("/")[2])
+    elif reference.lower().startswith("file:"):
+        names = [reference[len("file:") :]]
+        if names[0].startswith("//"):
+            host, slash, rest = names[0][2:].partition("/")
+            # Two slashes and a relative path are common, and no address.
+            names = ["/" + rest] if host in ("", "localhost") else [host + slash + rest]
+    elif _SCHEME.match(reference):
+        raise MeshError(
+            f"{label} places '{reference}', and only files of its folder are read",
+            "Copy the mesh into the folder, and name it by its path",
+        )
+    else:
+        names = [reference]
+    ways = [names, [name.replace("\\", "/") for name in names]]
+    ways += [[unquote(name) for name in way] for way in ways]
+    return list(dict.fromkeys(name for way in ways for name in way if name))
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # a name too long to be one
+        return False
 
 
 def _origin(label: str, holder: ElementTree.Element) -> Float[np.ndarray, "4 4"]:

@@ -12,7 +12,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
-import trimesh
 from google.protobuf.message import Message
 from mcap.writer import Writer
 from mcap_protobuf.schema import register_schema
@@ -24,6 +23,7 @@ from pipeline.config import ObjectsConfig, load_run_config
 from pipeline.errors import SoftgripError
 from pipeline.geometry.mesh_files import load_mesh_file
 from pipeline.geometry.mesh_folders import MESH_SUFFIXES
+from pipeline.geometry.urdf_files import load_object_file
 from pipeline.messages.grasps import GraspOrigin, LabelledGrasps, grasp_batch, grasps_of
 from pipeline.messages.objects import object_of
 from pipeline.messages.samples import sample_batch, samples_of
@@ -34,6 +34,7 @@ from pipeline.network.samples import Samples
 from schemas.softgrip.v1.grasps_pb2 import GraspBatch, ShardIndex
 from schemas.softgrip.v1.objects_pb2 import CatalogueObject
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
+from tests.geometry.corpus import corpus_cases, urdf_cases
 
 ROOT = Path(__file__).resolve().parents[2]
 PROVENANCE = Provenance("objects", "k", "c", "d", 7, (), "0.1.0")
@@ -49,6 +50,17 @@ def read_mesh(data: bytes) -> None:
         path = folder / f"mesh{suffix}"
         path.write_bytes(data[1:])
         load_mesh_file(path, folder, "mesh", FEW_FACES)
+
+
+def read_urdf(data: bytes) -> None:
+    """A URDF beside a mesh that it may place."""
+    with _folder() as folder:
+        for name, held in urdf_cases.MESH.items():
+            (folder / name).parent.mkdir(exist_ok=True)
+            (folder / name).write_bytes(held)
+        path = folder / "thing.urdf"
+        path.write_bytes(data)
+        load_object_file(path, folder, "thing", FEW_FACES)
 
 
 def read_toml(data: bytes) -> None:
@@ -93,14 +105,18 @@ def read_checkpoint(data: bytes) -> None:
 
 
 def mesh_seeds() -> Iterator[bytes]:
-    """A box in every format."""
-    box = trimesh.creation.box(extents=(0.05, 0.06, 0.07))
-    for number, suffix in enumerate(MESH_SUFFIXES):
-        exported = box.export(file_type=suffix[1:])
-        yield bytes([number]) + (exported if isinstance(exported, bytes) else exported.encode())
-    yield bytes([MESH_SUFFIXES.index(".ply")]) + box.export(file_type="ply", encoding="ascii")
-    text = box.export(file_type="stl_ascii")
-    yield bytes([MESH_SUFFIXES.index(".stl")]) + text.encode()
+    """Every way of writing a mesh that the corpus has, in one file each."""
+    for case in corpus_cases():
+        suffix = Path(case.name).suffix.lower()
+        if case.solid is not None and not case.beside and suffix in MESH_SUFFIXES:
+            yield bytes([MESH_SUFFIXES.index(suffix)]) + case.data
+
+
+def urdf_seeds() -> Iterator[bytes]:
+    """The URDF files of the corpus that are read wherever they lie."""
+    for case in urdf_cases.cases():
+        if case.solid is not None and b"{folder}" not in case.data:
+            yield case.data
 
 
 def toml_seeds() -> Iterator[bytes]:
@@ -247,6 +263,7 @@ READERS: dict[str, Reader] = {
     "toml": (read_toml, toml_seeds),
     "mcap": (read_mcap, mcap_seeds),
     "checkpoint": (read_checkpoint, checkpoint_seeds),
+    "urdf": (read_urdf, urdf_seeds),
 }
 KINDS = tuple(READERS.values())
 READERS["any"] = (read_any, any_seeds)

@@ -106,6 +106,8 @@ HOSTILE = {
     "no_corners.ply": ply(
         3, 1, triangle() + struct.pack("<i", -1), listed="list int int vertex_indices"
     ),
+    "text_corners.ply": ply(3, 1, b"0 0 0\n1 0 0\n0 1 0\n4294967295 0 1 2\n", "ascii"),
+    "corners.off": f"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n{TERA} 0 1 2\n".encode(),
     "nothing.ply": ply(3, 1, triangle(), more=f"element nothing {TERA}\n"),
     "list.ply": ply(3, 1, triangle(), more=f"element more {TERA}\nproperty list uchar int x\n"),
     "faces.stl": b"\0" * 80 + struct.pack("<I", FACES_31) + bytes(100),
@@ -131,8 +133,6 @@ HOSTILE = {
 }
 # What looks like it and is harmless: read as cheaply.
 HARMLESS = {
-    "text_corners.ply": ply(3, 1, b"0 0 0\n1 0 0\n0 1 0\n4294967295 0 1 2\n", "ascii"),
-    "corners.off": f"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n{TERA} 0 1 2\n".encode(),
     # Each node twice the child of the one before: 2^30 ways to its mesh.
     "nodes.glb": glb_of(
         [POINTS, CORNERS],

@@ -65,12 +65,12 @@ BAD_FILES = {
     "page.obj": (b"<!DOCTYPE html><html><body>404</body></html>", "web page"),
     "pointer.ply": (b"version https://git-lfs.github.com/spec/v1\noid sha256:0\n", "LFS"),
     "nan.stl": (with_nan(), "NaN"),
-    "points.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "no faces|cannot be read"),
-    "wild.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "refer to vertices|cannot be read"),
+    "points.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "3 points and no faces"),
+    "wild.obj": (b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "refers to vertex 9, and it has 3"),
     "tiny.stl": (binary_stl(1e-9 * BOX.vertices[BOX.faces]), "absurd size"),
     "huge.stl": (binary_stl(1e9 * BOX.vertices[BOX.faces]), "absurd size"),
     "cut.stl": (binary_stl(BOX.vertices[BOX.faces])[:-30], "truncated"),
-    "bomb.stl": (b"\0" * 80 + struct.pack("<I", 2**32 - 1) + b"\0" * 900, "truncated|more than"),
+    "bomb.stl": (b"\0" * 80 + struct.pack("<I", 2**32 - 1) + b"\0" * 900, "absurd size"),
     "bomb.ply": (
         b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\n"
         b"property float y\nproperty float z\nelement face 100000000000\n"

@@ -123,7 +123,7 @@ def test_an_object_may_keep_its_own_size(folder: Path, tmp_path: Path) -> None:
         ("", "", "has no visual or collision geometry"),
         (visual("<capsule/>"), "", "which URDF does not know"),
         (
-            visual('<box size="0.1"/>'),
+            visual('<box size="0.1"/>') + '</link><link name="l1">' + visual('<box size="0.1"/>'),
             '<joint type="revolute"><parent link="l0"/><child link="l1"/></joint>',
             "an object must be rigid",
         ),

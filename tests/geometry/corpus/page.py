@@ -1,0 +1,68 @@
+"""The table of the corpus: what each file is, and what reading it gives."""
+
+import tempfile
+from pathlib import Path
+
+from pipeline.config import ObjectsConfig
+from pipeline.errors import MeshError
+from pipeline.geometry.catalogue import measure_object
+from pipeline.geometry.shape import surface_area, volume
+from pipeline.geometry.urdf_files import load_object_file
+from tests.geometry.corpus import corpus
+from tests.geometry.corpus.case import Case, write
+
+PAGE = Path(__file__).with_name("README.md")
+_HEAD = """# Mesh files that people bring
+
+Made by `python -m tests.geometry.corpus --page` from the scripts beside this page; the files
+themselves are written by `python -m tests.geometry.corpus FOLDER`, with `answers.json` for
+readers other than ours. `tests/geometry/test_corpus.py` holds every row.
+
+Volume, area and NSVR are what is right; each file is read to these within its tolerance (a
+relative error of volume and of area). A refused file has the sentence that refuses it.
+"""
+
+
+def page() -> str:
+    """The whole page."""
+    parts = [_HEAD]
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch).resolve()
+        for kind, cases in corpus().items():
+            good = [case for case in cases if case.solid is not None]
+            bad = [case for case in cases if case.solid is None]
+            parts.append(f"\n## {kind}: {len(good)} read, {len(bad)} refused\n")
+            parts.append("| file | what it is | V [cm³] | A [cm²] | NSVR | bodies | within |")
+            parts.append("|-|-|-|-|-|-|-|")
+            parts += [_read(case, folder) for case in good]
+            if bad:
+                parts.append("\n| file | what it is | why it is refused |\n|-|-|-|")
+                parts += [_refused(case, folder) for case in bad]
+    return "\n".join(parts) + "\n"
+
+
+def _read(case: Case, folder: Path) -> str:
+    config = ObjectsConfig(rescaled=False)
+    source = load_object_file(write(case, folder), folder, "object", config)
+    mesh = measure_object(source, config).mesh
+    assert case.solid is not None
+    worst = max(
+        abs(volume(mesh) / case.solid.volume_m3 - 1),
+        abs(surface_area(mesh) / case.solid.area_m2 - 1),
+    )
+    assert worst <= case.tolerance, (case.name, worst)
+    return (
+        f"| `{case.name}` | {case.what} | {case.solid.volume_m3 * 1e6:.4f} "
+        f"| {case.solid.area_m2 * 1e4:.4f} | {case.solid.nsvr:.4f} | {case.bodies} "
+        f"| {case.tolerance:.0e} |"
+    )
+
+
+def _refused(case: Case, folder: Path) -> str:
+    config = ObjectsConfig(rescaled=False)
+    try:
+        measure_object(load_object_file(write(case, folder), folder, "object", config), config)
+    except MeshError as error:
+        sentence = str(error).replace(str(folder), "FOLDER").replace("|", "\\|")
+        return f"| `{case.name}` | {case.what} | {sentence} |"
+    raise AssertionError(f"{case.name} was not refused")
