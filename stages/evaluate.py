@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact, publish_bytes
+from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact
 from pipeline.artifacts.sharding import is_current
 from pipeline.config import RunConfig
 from pipeline.config.evaluation import PolicyName
-from pipeline.config.grasps import PadConfig
 from pipeline.errors import ArtifactError
 from pipeline.execution import (
     RunFolder,
@@ -29,10 +28,8 @@ from pipeline.messages.objects import read_objects
 from pipeline.messages.scenes import read_scenes
 from pipeline.messages.training import EXPORT
 from pipeline.network.control_inference import ControlPredictor
-from pipeline.recording.evaluate import blueprint, show_attempts, worst_first
-from pipeline.recording.recording import recording, spread
+from pipeline.recording.evaluate import draw_evaluate
 from pipeline.recording.results import markdown
-from pipeline.recording.robot import ShownRobot
 from pipeline.simulation.picking import run_clutter
 from pipeline.world.scene import ClutterScene
 from schemas.softgrip.v1.evaluation_pb2 import Attempt, Comparison, LevelResult
@@ -62,7 +59,7 @@ def build(stage: StageContext) -> Summary:
     parts = list(progress(done, len(jobs), "evaluate: clutters", "clutter"))
     attempts = [message for part in parts for message in read_attempts(part)]
     results = results_of(scenes, stage.config.evaluate.policies, attempts)
-    publish(stage, scenes, attempts, results)
+    publish(stage, attempts, results)
     shutil.rmtree(stage.folder.state("evaluate"))
     return results.summary()
 
@@ -132,20 +129,8 @@ def read_attempts(path: Path) -> list[Attempt]:
         return [message for _, message in artifact.messages(Attempt)]
 
 
-def publish(
-    stage: StageContext, scenes: list[ClutterScene], attempts: list[Attempt], results: Results
-) -> None:
-    """The film and the table, then the artifact."""
-    meshes = {n: item.mesh for n, (item, _) in catalogue(stage.upstream("objects")).items()}
-    names = {s.scene_id: [placed.object_name for placed in s.objects] for s in scenes}
-    ordered = worst_first(attempts)
-    shown = [ordered[i] for i in spread(len(ordered), stage.config.recording.attempts)]
-    text = markdown(results.levels, results.policies, results.comparisons)
-    scale = stage.config.gripper.pad.radius_m / PadConfig().radius_m
-    view = blueprint(stage.config.evaluate.robot == "iiwa14", scale)
-    with recording(stage, view) as stream:
-        show_attempts(stream, shown, names, meshes, text, shown_robot(stage.config))
-    publish_bytes(stage.folder.path / "evaluate.md", text.encode())
+def publish(stage: StageContext, attempts: list[Attempt], results: Results) -> None:
+    """Write the artifact."""
     with ArtifactWriter(stage.output, stage.provenance()) as artifact:
         for number, message in enumerate(attempts):
             artifact.write("/attempts", message, log_time_ns=number)
@@ -155,11 +140,6 @@ def publish(
             artifact.write("/policies", result, log_time_ns=number)
         for number, comparison in enumerate(results.comparisons):
             artifact.write("/comparisons", comparison, log_time_ns=number)
-
-
-def shown_robot(config: RunConfig) -> ShownRobot:
-    """What the film shows of the robot beside its poses."""
-    return ShownRobot(config.gripper.pad.radius_m, config.evaluate.hand, config.evaluate.arm)
 
 
 def print_table(folder: RunFolder) -> None:
@@ -175,4 +155,4 @@ if __name__ == "__main__":
     if sys.argv[1:] == ["--table"]:
         print_table(RunFolder(RUNS_DIR / os.environ.get("RUN", "default")))
     else:
-        stage_command(EVALUATE, build, inputs_of)
+        stage_command(EVALUATE, build, inputs_of, draw=draw_evaluate)

@@ -18,6 +18,7 @@ from pipeline.errors import ConfigError
 from pipeline.execution.commands import run_command
 from pipeline.execution.stage import RunFolder, Stage, StageContext
 from pipeline.execution.staleness import (
+    RECORDING_ALONE,
     missing_shards,
     recording_is_fresh,
     stage_context,
@@ -29,7 +30,12 @@ OBJECTS = Stage(
     "objects", ("seed", "objects", "split"), shown=("recording.objects",), drawn_apart=True
 )
 SCENES = Stage(
-    "scenes", ("seed", "scenes", "cameras", "recording.scenes"), ("objects",), renders=True
+    "scenes",
+    ("seed", "scenes", "cameras"),
+    ("objects",),
+    renders=True,
+    shown=("recording.scenes",),
+    drawn_apart=True,
 )
 GRASPS = Stage(
     "grasps",
@@ -37,17 +43,32 @@ GRASPS = Stage(
     ("objects", "scenes"),
     sharded=True,
 )
-SHARDS = Stage("shards", ("seed", "shards", "recording.clouds"), ("grasps",), sharded=True)
-TRAIN = Stage("train", ("seed", "network", "train", "gripper.pad", "recording.clouds"), ("shards",))
+SHARDS = Stage(
+    "shards",
+    ("seed", "shards"),
+    ("grasps",),
+    sharded=True,
+    shown=("recording.clouds",),
+    drawn_apart=True,
+)
+TRAIN = Stage(
+    "train",
+    ("seed", "network", "train", "gripper.pad"),
+    ("shards",),
+    shown=("recording.clouds",),
+    drawn_apart=True,
+)
 EVALUATE = Stage(
     "evaluate",
-    ("seed", "evaluate", "scenes", "cameras", "gripper", "sensing", "recording.attempts"),
+    ("seed", "evaluate", "scenes", "cameras", "gripper", "sensing"),
     ("objects", "scenes", "train"),
+    shown=("recording.attempts",),
+    drawn_apart=True,
 )
 STAGES = {stage.name: stage for stage in (OBJECTS, SCENES, GRASPS, SHARDS, TRAIN, EVALUATE)}
 
 # Beside the pipeline: nothing downstream reads it, and it is made only when asked for.
-SWEEP = Stage("sweep", ("seed", "network", "train", "sweep"), ("shards",))
+SWEEP = Stage("sweep", ("seed", "network", "train", "sweep"), ("shards",), drawn_apart=True)
 MADE = {**STAGES, SWEEP.name: SWEEP}
 
 RUNS_DIR = Path("runs")
@@ -106,7 +127,7 @@ def status(run: RunName = "default", mesh_dir: MeshDir = None) -> None:
     stale: set[str] = set()
     for name, stage in STAGES.items():
         reason = _staleness(stage, folder, mesh_dir, stale)
-        if reason:
+        if reason and not reason.startswith(RECORDING_ALONE):
             stale.add(name)
         sys.stdout.write(f"{name:<9} {'stale: ' + reason if reason else 'up to date'}\n")
 

@@ -53,9 +53,10 @@ from pipeline.messages.grasps import (
 from pipeline.messages.objects import read_objects
 from pipeline.messages.scenes import read_placed, read_scene, scene_count
 from pipeline.recording.grasps import ShownGrasp, blueprint, show_grasps
-from pipeline.recording.recording import recording, spread
+from pipeline.recording.recording import recording
 from pipeline.sensing.depth_noise import disturb
 from pipeline.sensing.sub_cloud import merged_sub_clouds
+from pipeline.spread import spread
 from pipeline.stopwatch import Stopwatch
 from pipeline.world.cameras import PinholeCamera, pixel_rays, shown_whole
 from pipeline.world.raycasting import RayScene

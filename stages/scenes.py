@@ -29,10 +29,9 @@ from pipeline.execution.busy import BusyClock
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.messages.objects import read_objects
 from pipeline.messages.scenes import read_scene, write_scene
-from pipeline.recording.recording import recording, spread
-from pipeline.recording.scenes import blueprint, show_scene
+from pipeline.recording.scenes import draw_scenes
 from pipeline.sensing.rendering import Renderer, new_renderer, rendered
-from pipeline.world.cameras import camera_names, scene_cameras
+from pipeline.world.cameras import scene_cameras
 from pipeline.world.scene import ClutterScene
 from stages.graph import SCENES, inputs_of
 
@@ -58,10 +57,8 @@ def build(stage: StageContext) -> Summary:
     jobs, clock = scene_jobs(stage), BusyClock()
     with ArtifactWriter(stage.output, stage.provenance()) as artifact:
         scenes = make_scenes(stage, jobs, artifact, clock)
-        render_share = clock.share()
-        record(stage, jobs)
     shutil.rmtree(stage.folder.state("scenes"))
-    return summary(scenes) | {"render_share": render_share}
+    return summary(scenes) | {"render_share": clock.share()}
 
 
 def make_scenes(
@@ -164,17 +161,6 @@ def renderer_of(config: RunConfig) -> Renderer:
     return new_renderer(config.cameras.renderer, config.scenes)
 
 
-def record(stage: StageContext, jobs: list[SceneJob]) -> None:
-    """The recording: some of the scenes, read from their files."""
-    items = catalogue(stage.upstream("objects"))
-    meshes = {name: item.mesh for name, (item, _) in items.items()}
-    nsvr = {name: item.nsvr for name, (item, _) in items.items()}
-    shown = spread(len(jobs), stage.config.recording.scenes)
-    with recording(stage, blueprint(camera_names(stage.config.cameras))) as stream:
-        for step, index in enumerate(shown):
-            show_scene(stream, step, read_scene(jobs[index].path, 0), meshes, nsvr)
-
-
 def summary(scenes: list[ClutterScene]) -> Summary:
     """The stage's headline figures."""
     return {
@@ -187,4 +173,4 @@ def summary(scenes: list[ClutterScene]) -> Summary:
 
 
 if __name__ == "__main__":
-    stage_command(SCENES, build, inputs_of)
+    stage_command(SCENES, build, inputs_of, draw=draw_scenes)

@@ -1,7 +1,6 @@
 """Stage 4, shards: labelled grasps → shuffled train, val and test shards, split by object."""
 
 from collections import Counter
-from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -19,12 +18,10 @@ from pipeline.errors import ArtifactError
 from pipeline.execution import StageContext, Summary, generator, progress, stage_command
 from pipeline.labelling.balancing import first_proposals, quality_histogram
 from pipeline.messages.grasps import grasps_of
-from pipeline.messages.samples import sample_batch, samples_of
+from pipeline.messages.samples import sample_batch
 from pipeline.network.samples import SPLITS, Samples, joined_samples
-from pipeline.recording.recording import recording
-from pipeline.recording.shards import blueprint, show_samples
+from pipeline.recording.shards import draw_shards
 from schemas.softgrip.v1.grasps_pb2 import GraspBatch, ShardEntry
-from schemas.softgrip.v1.samples_pb2 import SampleBatch
 from stages.graph import SHARDS, inputs_of
 
 TOPIC = "/samples"
@@ -44,8 +41,6 @@ def build(stage: StageContext) -> Summary:
         order = generator(stage.config.seed, "shuffle", split).permutation(len(samples))
         entries += write_split(stage, split, samples.take(order), names)
     every = joined_samples([by_split[split] for split in SPLITS])
-    with recording(stage, blueprint()) as stream:
-        show_samples(stream, by_split, stage.config.recording.clouds)
     histogram = quality_histogram(every.quality.astype(np.float64))
     write_index(stage.output, stage.provenance(), entries, histogram)
     return summary(entries, by_split, names)
@@ -112,18 +107,6 @@ def write_shard(
             artifact.write(TOPIC, sample_batch(part, names), log_time_ns=first + start)
 
 
-def read_split(index: Path, split: str) -> Samples:
-    """All samples of a split, in shard order."""
-    return joined_samples(list(_batches(listed_shards(index, [split]))))
-
-
-def _batches(shards: Iterable[Path]) -> Iterable[Samples]:
-    for shard in shards:
-        with open_artifact(shard) as artifact:
-            for _, message in artifact.messages(SampleBatch):
-                yield samples_of(message)
-
-
 def summary(
     entries: list[ShardEntry], by_split: dict[str, Samples], names: tuple[str, ...]
 ) -> Summary:
@@ -143,4 +126,4 @@ def summary(
 
 
 if __name__ == "__main__":
-    stage_command(SHARDS, build, inputs_of)
+    stage_command(SHARDS, build, inputs_of, draw=draw_shards)

@@ -47,8 +47,7 @@ from pipeline.network.family import (
 )
 from pipeline.network.samples import SPLITS, Samples
 from pipeline.network.training import train
-from pipeline.recording.recording import recording
-from pipeline.recording.sweep import blueprint, show_sweep
+from pipeline.recording.sweep import draw_sweep
 from schemas.softgrip.v1.training_pb2 import SweepBudget, SweepNetwork
 from stages.graph import SWEEP, inputs_of
 from stages.train import SAMPLES
@@ -84,7 +83,6 @@ def build(stage: StageContext) -> Summary:
         for network in progress(networks, len(networks), "sweep: timing", "network")
     ]
     budget = budget_message(config, given)
-    record(stage, networks, times_ms, budget)
     write(stage, networks, budget)
     shutil.rmtree(stage.folder.state("sweep"))
     return sweep_summary(networks, times_ms, budget)
@@ -136,14 +134,6 @@ def train_member(job: MemberJob) -> Path:
     return job.path
 
 
-def record(
-    stage: StageContext, networks: list[SweepNetwork], times_ms: list[float], budget: SweepBudget
-) -> None:
-    """The recording: error and time against depth, a curve a channel set."""
-    with recording(stage, blueprint()) as stream:
-        show_sweep(stream, networks, times_ms, budget)
-
-
 def write(stage: StageContext, networks: list[SweepNetwork], budget: SweepBudget) -> None:
     """The artifact: the budget, then every network with its curve."""
     with ArtifactWriter(stage.output, stage.provenance()) as artifact:
@@ -153,4 +143,4 @@ def write(stage: StageContext, networks: list[SweepNetwork], budget: SweepBudget
 
 
 if __name__ == "__main__":
-    stage_command(SWEEP, build, inputs_of)
+    stage_command(SWEEP, build, inputs_of, draw=draw_sweep)

@@ -23,8 +23,7 @@ from pipeline.network.resuming import EpochMetrics
 from pipeline.network.samples import Samples
 from pipeline.network.timing import runtimes_ms_a_grasp
 from pipeline.network.training import TrainedNetwork, chosen_device, train
-from pipeline.recording.recording import recording
-from pipeline.recording.train import blueprint, show_training
+from pipeline.recording.train import draw_train
 from stages.graph import TRAIN, inputs_of
 
 COMPARED = 512  # test clouds on which the export for control is held against its original
@@ -57,7 +56,6 @@ def build(stage: StageContext, ranks: Ranks = ALONE) -> Summary:
     checkpoint = save_checkpoint_bytes(trained.network)
     publish_bytes(stage.folder.path / "train" / CHECKPOINT, checkpoint)
     publish_bytes(stage.folder.path / "train" / EXPORT, exported)
-    record(stage, trained, figures, test_set)
     write(stage, trained, figures, checkpoint, exported)
     inference = runtimes_ms_a_grasp(
         trained.network,
@@ -99,14 +97,6 @@ def export_for_control(stage: StageContext, trained: TrainedNetwork, test_set: S
     )
     logger.info("train: exported for control, largest difference {:.1e}", difference)
     return exported
-
-
-def record(
-    stage: StageContext, trained: TrainedNetwork, figures: TestFigures, test_set: Samples
-) -> None:
-    """The recording: the curve, the calibration, and the worst test samples."""
-    with recording(stage, blueprint()) as stream:
-        show_training(stream, trained.history, figures, test_set, stage.config.recording.clouds)
 
 
 def write(
@@ -156,7 +146,7 @@ def main() -> None:
     """The stage's command, in every process that torchrun started."""
     with joined_ranks() as ranks:
         together = update_wrapper(partial(build, ranks=ranks), build)
-        stage_command(TRAIN, together, inputs_of, ranks.rank)
+        stage_command(TRAIN, together, inputs_of, ranks.rank, draw_train)
 
 
 if __name__ == "__main__":

@@ -18,6 +18,7 @@ InputsOf = Callable[[Stage, RunFolder, Path | None], dict[str, Path]]
 
 MEMO = "hashes.json"
 RENDERER_MEMO = "renderer.json"
+RECORDING_ALONE = "recording alone"
 
 
 def stage_context(
@@ -115,7 +116,7 @@ def missing_shards(index: Path) -> list[Path]:
 def why_stale(context: StageContext) -> list[str]:
     """Why a stage is not fresh, in words; empty where it is."""
     if artifact_is_fresh(context):
-        return [] if recording_is_fresh(context) else [f"recording alone: {_why_drawn(context)}"]
+        return [] if recording_is_fresh(context) else [f"{RECORDING_ALONE}: {_why_drawn(context)}"]
     if not context.output.is_file():
         return ["never made"]
     built = built_key(context.folder, context.name)

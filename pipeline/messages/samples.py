@@ -1,9 +1,13 @@
 """Training samples ↔ softgrip.v1.SampleBatch."""
 
 import math
+from collections.abc import Iterable, Iterator
+from pathlib import Path
 
+from pipeline.artifacts.reading import open_artifact
+from pipeline.artifacts.sharding import listed_shards
 from pipeline.artifacts.tensors import set_tensors, tensors_of
-from pipeline.network.samples import Samples
+from pipeline.network.samples import Samples, joined_samples
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 
 STORED_AS = {
@@ -44,3 +48,23 @@ def samples_of(message: SampleBatch) -> Samples:
     arrays = tensors_of(message, STORED_AS, SHAPES, UNLESS_THERE)
     arrays["cloud_mask"] = arrays["cloud_mask"].view(bool)
     return Samples(**arrays)
+
+
+def read_split(index: Path, split: str) -> Samples:
+    """All samples of a split, in shard order.
+
+    Parameters
+    ----------
+    index
+        The index of a sharded artifact.
+    split
+        Such as ``train``.
+    """
+    return joined_samples(list(_batches(listed_shards(index, [split]))))
+
+
+def _batches(shards: Iterable[Path]) -> Iterator[Samples]:
+    for shard in shards:
+        with open_artifact(shard) as artifact:
+            for _, message in artifact.messages(SampleBatch):
+                yield samples_of(message)

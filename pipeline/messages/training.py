@@ -6,9 +6,10 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from pipeline.artifacts.tensors import to_tensor
-from pipeline.network.held_out import TestFigures
+from pipeline.artifacts.tensors import from_tensor, to_tensor
+from pipeline.network.held_out import CLASSES, TestFigures, error_by_pictures
 from pipeline.network.resuming import EpochMetrics
+from pipeline.network.samples import Samples
 from pipeline.network.training import TrainedNetwork
 from schemas.softgrip.v1.training_pb2 import Epoch, TrainingResult
 
@@ -53,6 +54,61 @@ def result_message(trained: TrainedNetwork, figures: TestFigures) -> TrainingRes
         test_mae_as_proposed=figures.mae_as_proposed,
         mean_predictor_mae_as_proposed=figures.mean_predictor_mae_as_proposed,
     )
+
+
+def metrics_of(message: Epoch) -> EpochMetrics:
+    """The metrics of one epoch, read back."""
+    return EpochMetrics(
+        epoch=message.epoch,
+        train_loss=message.train_loss,
+        train_mae=message.train_mae,
+        val_mae=message.val_mae,
+        learning_rate=message.learning_rate,
+        samples=message.samples,
+    )
+
+
+def figures_of(message: TrainingResult, test_set: Samples) -> TestFigures:
+    """The figures of a finished training, read back.
+
+    Parameters
+    ----------
+    message
+        Of the training.
+    test_set
+        The test split that it was measured on; it holds what the message counts by.
+    """
+    predicted = from_tensor(message.test_prediction)
+    by_class = dict(message.test_mae_by_class)
+    return TestFigures(
+        quality=from_tensor(message.test_quality),
+        predicted=predicted,
+        mae=message.test_mae,
+        mae_single=message.test_mae_single,
+        mae_as_proposed=_optional(message, "test_mae_as_proposed"),
+        mean_predictor_mae=message.mean_predictor_mae,
+        mean_predictor_mae_as_proposed=_optional(message, "mean_predictor_mae_as_proposed"),
+        seal_ratio_mae=message.baseline_mae["seal_ratio"],
+        by_class={name: by_class[name] for name in CLASSES.tolist() if name in by_class},
+        by_pictures=error_by_pictures(predicted, test_set),
+        first_proposals=int((np.asarray(test_set.proposal_weight) > 0).sum()),
+        count_by_class=dict(message.test_count_by_class),
+        by_tenth=_absent_as_none(from_tensor(message.test_mae_by_tenth)),
+        calibration=[
+            (_absent_as_none(row)[0], _absent_as_none(row)[1], int(row[2]))
+            for row in from_tensor(message.calibration)
+        ],
+        train_count=message.train_count,
+        val_count=message.val_count,
+    )
+
+
+def _optional(message: TrainingResult, field: str) -> float | None:
+    return getattr(message, field) if message.HasField(field) else None
+
+
+def _absent_as_none(values: Float[np.ndarray, " n"]) -> list[float | None]:
+    return [None if math.isnan(value) else float(value) for value in values]
 
 
 def _numbers(values: Sequence[float | None]) -> Float[np.ndarray, " n"]:

@@ -4,15 +4,30 @@ The worst failure is the one that promised most: the highest q-hat among those t
 """
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from pipeline.artifacts import open_artifact, publish_bytes
 from pipeline.artifacts.tensors import from_tensor
+from pipeline.config import RunConfig
+from pipeline.config.grasps import PadConfig
 from pipeline.geometry.mesh import Mesh
+from pipeline.messages.objects import read_objects
+from pipeline.messages.scenes import read_scenes
 from pipeline.recording import colours
-from pipeline.recording.recording import looking, name_curve, numbered, step, time_panel
+from pipeline.recording.recording import (
+    MadeStage,
+    looking,
+    name_curve,
+    numbered,
+    recording,
+    step,
+    time_panel,
+)
+from pipeline.recording.results import markdown
 from pipeline.recording.robot import (
     GRIPPER,
     ShownRobot,
@@ -22,13 +37,44 @@ from pipeline.recording.robot import (
     show_gripper,
 )
 from pipeline.recording.shapes import shown_mesh, shown_pose
-from schemas.softgrip.v1.evaluation_pb2 import Attempt, DepthPicture
+from pipeline.spread import spread
+from schemas.softgrip.v1.evaluation_pb2 import Attempt, Comparison, DepthPicture, LevelResult
 
 TIMELINE = "frame"
 SHOWN_CANDIDATES = 60  # the best of them: more hide the scene
 APPROACH_M = 0.025
 CAMERAS = ("static_0", "wrist")
 STATES = ("observe", "pregrasp", "approach", "seal", "lift", "shake", "done")
+
+
+def draw_evaluate(stage: MadeStage, figures: Mapping[str, Any]) -> None:
+    """Draw the film and the table from the finished evaluation."""
+    meshes = {
+        name: item.mesh for name, (item, _) in read_objects(stage.upstream("objects")).items()
+    }
+    names = {
+        scene.scene_id: [placed.object_name for placed in scene.objects]
+        for scene in read_scenes(stage.upstream("scenes"))
+        if scene.split == "test"
+    }
+    with open_artifact(stage.output) as artifact:
+        attempts = [message for _, message in artifact.messages(Attempt)]
+        levels = [message for _, message in artifact.messages(LevelResult, "/levels")]
+        policies = [message for _, message in artifact.messages(LevelResult, "/policies")]
+        comparisons = [message for _, message in artifact.messages(Comparison)]
+    ordered = worst_first(attempts)
+    shown = [ordered[i] for i in spread(len(ordered), stage.config.recording.attempts)]
+    text = markdown(levels, policies, comparisons)
+    scale = stage.config.gripper.pad.radius_m / PadConfig().radius_m
+    view = blueprint(stage.config.evaluate.robot == "iiwa14", scale)
+    with recording(stage, view) as stream:
+        show_attempts(stream, shown, names, meshes, text, shown_robot(stage.config))
+    publish_bytes(stage.output.with_suffix(".md"), text.encode())
+
+
+def shown_robot(config: RunConfig) -> ShownRobot:
+    """What the film shows of the robot beside its poses."""
+    return ShownRobot(config.gripper.pad.radius_m, config.evaluate.hand, config.evaluate.arm)
 
 
 def blueprint(with_arm: bool = False, scale: float = 1.0) -> rrb.Blueprint:

@@ -17,11 +17,11 @@ from pipeline.recording.recording import (
     name_curve,
     numbered,
     recording,
-    spread,
     step,
     time_panel,
 )
 from pipeline.recording.shapes import shown_facets, shown_mesh
+from pipeline.spread import spread
 
 TIMELINE = "object"
 SPACING_M = 0.22

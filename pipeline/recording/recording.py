@@ -169,10 +169,3 @@ def numbered(stream: rr.RecordingStream, path: str, number: int) -> str:
     if number > 0:
         stream.log(f"{path}/{number - 1:04d}", rr.Clear(recursive=True))
     return f"{path}/{number:04d}"
-
-
-def spread(total: int, wanted: int) -> list[int]:
-    """Indices of at most ``wanted`` items, evenly spread over ``total``."""
-    if total <= wanted:
-        return list(range(total))
-    return sorted({round(i * (total - 1) / max(wanted - 1, 1)) for i in range(wanted)})

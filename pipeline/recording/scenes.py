@@ -1,6 +1,7 @@
 """scenes.rrd: each clutter in 3-D with its cameras, pictures, cloud and table of facts."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import rerun as rr
@@ -8,10 +9,20 @@ import rerun.blueprint as rrb
 
 from pipeline.clutter.levels import level_of
 from pipeline.geometry.mesh import Mesh
+from pipeline.messages.objects import read_objects
+from pipeline.messages.scenes import read_scene, scene_count
 from pipeline.recording import colours
-from pipeline.recording.recording import looking, numbered, step, time_panel
+from pipeline.recording.recording import (
+    MadeStage,
+    looking,
+    numbered,
+    recording,
+    step,
+    time_panel,
+)
 from pipeline.recording.shapes import shown_mesh, shown_pose
-from pipeline.world.cameras import points_of_depth
+from pipeline.spread import spread
+from pipeline.world.cameras import camera_names, points_of_depth
 from pipeline.world.scene import ClutterScene
 from pipeline.world.view import CameraView
 
@@ -22,6 +33,17 @@ CLOUD_EVERY = 3  # every third pixel a side: a ninth of the points
 
 SHOWN_CAMERAS = 3  # more rows are too small to see; their pictures are in the recording
 PICTURES = ("colour", "depth", "segmentation", "normals")
+
+
+def draw_scenes(stage: MadeStage, figures: Mapping[str, Any]) -> None:
+    """Draw the recording: some of the finished scenes, read back."""
+    items = read_objects(stage.upstream("objects"))
+    meshes = {name: item.mesh for name, (item, _) in items.items()}
+    nsvr = {name: item.nsvr for name, (item, _) in items.items()}
+    shown = spread(scene_count(stage.output), stage.config.recording.scenes)
+    with recording(stage, blueprint(camera_names(stage.config.cameras))) as stream:
+        for number, index in enumerate(shown):
+            show_scene(stream, number, read_scene(stage.output, index), meshes, nsvr)
 
 
 def blueprint(cameras: Sequence[str]) -> rrb.Blueprint:

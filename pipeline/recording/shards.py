@@ -1,18 +1,30 @@
 """shards.rrd: how the dataset is balanced, and a walk through its clouds by growing quality."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
 from pipeline.labelling.balancing import quality_histogram
-from pipeline.network.samples import Samples
+from pipeline.messages.samples import read_split
+from pipeline.network.samples import SPLITS, Samples
 from pipeline.recording import colours
-from pipeline.recording.recording import looking, spread, time_panel
+from pipeline.recording.recording import MadeStage, looking, recording, time_panel
+from pipeline.spread import spread
 
 TIMELINE = "sample"
 SHEET_COLUMNS = 10
 SHEET_SPACING = 3.0  # in r_G: clouds are 2.4 wide
 CELL_RADIUS = 0.04
+
+
+def draw_shards(stage: MadeStage, figures: Mapping[str, Any]) -> None:
+    """Draw the recording from the finished shards."""
+    by_split = {split: read_split(stage.output, split) for split in SPLITS}
+    with recording(stage, blueprint()) as stream:
+        show_samples(stream, by_split, stage.config.recording.clouds)
 
 
 def blueprint() -> rrb.Blueprint:

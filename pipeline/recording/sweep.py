@@ -1,18 +1,43 @@
 """sweep.rrd: error and time against depth, a curve a channel set, and what each part buys."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from pipeline.artifacts import open_artifact
+from pipeline.errors import ArtifactError
+from pipeline.messages.sweep import read_sweep
 from pipeline.network.family import VARIANTS
 from pipeline.recording import colours
-from pipeline.recording.recording import name_curve, step, time_panel
+from pipeline.recording.recording import MadeStage, name_curve, recording, step, time_panel
 from schemas.softgrip.v1.training_pb2 import SweepBudget, SweepNetwork
 
 TIMELINE = "layers"
 _CHOSEN_COLOUR = (60, 200, 90)
+
+
+def draw_sweep(stage: MadeStage, figures: Mapping[str, Any]) -> None:
+    """Draw the recording: errors are of the artifact, times of the summary.
+
+    Raises
+    ------
+    ArtifactError
+        The summary, which holds the times, is lost.
+    """
+    networks = read_sweep(stage.output)
+    times_ms = [row["ms_a_grasp"] for row in figures.get("networks", [])]
+    if len(times_ms) != len(networks):
+        raise ArtifactError(
+            f"The summary beside {stage.output} is lost, and the recording shows its times",
+            "Run the stage again with --force",
+        )
+    with open_artifact(stage.output) as artifact:
+        budget = artifact.one(SweepBudget)
+    with recording(stage, blueprint()) as stream:
+        show_sweep(stream, networks, times_ms, budget)
 
 
 def blueprint() -> rrb.Blueprint:

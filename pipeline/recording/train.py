@@ -1,22 +1,44 @@
 """train.rrd: curves, calibration, and the samples the network is most wrong about."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
+from pipeline.artifacts import open_artifact
+from pipeline.messages.samples import read_split
+from pipeline.messages.training import figures_of, metrics_of
 from pipeline.network.held_out import TestFigures
 from pipeline.network.resuming import EpochMetrics
 from pipeline.network.samples import Samples
 from pipeline.recording import colours
-from pipeline.recording.recording import looking, name_curve, step, time_panel
+from pipeline.recording.recording import (
+    MadeStage,
+    looking,
+    name_curve,
+    recording,
+    step,
+    time_panel,
+)
+from schemas.softgrip.v1.training_pb2 import Epoch, TrainingResult
 
 TIMELINE = "epoch"
 SHEET_COLUMNS = 6
 SHEET_SAMPLES = 24
 SHEET_SPACING = 3.0  # in r_G: clouds are 2.4 wide
 SCATTER_POINTS = 5000
+
+
+def draw_train(stage: MadeStage, figures: Mapping[str, Any]) -> None:
+    """Draw the recording: the curve and the figures of the artifact, on the test clouds."""
+    test_set = read_split(stage.upstream("shards"), "test")
+    with open_artifact(stage.output) as artifact:
+        history = [metrics_of(message) for _, message in artifact.messages(Epoch)]
+        held_out = figures_of(artifact.one(TrainingResult), test_set)
+    with recording(stage, blueprint()) as stream:
+        show_training(stream, history, held_out, test_set, stage.config.recording.clouds)
 
 
 def blueprint() -> rrb.Blueprint:

@@ -1,10 +1,13 @@
 """The Rerun viewer without a screen: a recording opened, checked and photographed."""
 
+import os
+import signal
 import socket
+import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -16,7 +19,10 @@ from pipeline.artifacts import publish_bytes
 from pipeline.errors import MachineError, SoftgripError
 from pipeline.physics.vulkan import choose_vulkan_driver
 
+LOCAL = "127.0.0.1"  # the viewer would otherwise listen to the whole network
+
 _PATIENCE_S = 60.0
+_START_PAUSE_S = 0.1
 _PAUSE_S = 0.5
 _TRIES = 3  # beyond the first; the viewer gives up on a picture after some seconds
 
@@ -71,21 +77,52 @@ def off_screen_viewer() -> Iterator[ViewerClient]:
     Raises MachineError where it does not start, as without any graphics driver.
     """
     choose_vulkan_driver()
-    viewer = Path(sys.executable).with_name("rerun")
+    port = _free_port()
+    # The viewer is a program that a script starts: both end with their session.
+    process = subprocess.Popen(
+        _viewer_command(port),
+        start_new_session=True,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
     try:
-        client = ViewerClient.spawn(
-            headless=True,
-            port=_free_port(),
-            hide_welcome_screen=True,
-            executable_path=str(viewer),
-        )
-        client.get_state()
-    except (RuntimeError, ConnectionError) as error:
-        raise MachineError(
-            f"the Rerun viewer does not start ({error})", "Run `make doctor`"
-        ) from error
-    with client:
-        yield client
+        yield _connected(process, port)
+    finally:
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)  # it holds nothing that could be lost
+        process.wait()
+
+
+def _viewer_command(port: int) -> list[str]:
+    """The viewer's command line: no window, and heard by this machine alone."""
+    viewer = str(Path(sys.executable).with_name("rerun"))
+    options = ["--headless", "--hide-welcome-screen", "--renderer", "vulkan"]
+    return [viewer, *options, "--bind", LOCAL, "--port", str(port)]
+
+
+def _connected(process: subprocess.Popen[bytes], port: int) -> ViewerClient:
+    """A client of the viewer once it answers.
+
+    Raises
+    ------
+    MachineError
+        The viewer ended, or does not answer in time.
+    """
+    deadline = time.monotonic() + _PATIENCE_S
+    while process.poll() is None and time.monotonic() < deadline:
+        try:
+            client = ViewerClient.connect(f"rerun+http://{LOCAL}:{port}/proxy")
+            client.get_state()
+        except (RuntimeError, ConnectionError, TimeoutError):
+            time.sleep(_START_PAUSE_S)
+        else:
+            return client
+    how = "answers nothing" if process.poll() is None else f"ended with code {process.returncode}"
+    raise MachineError(
+        f"the Rerun viewer does not start: it {how}",
+        f"Run `make doctor`, and see what '{' '.join(_viewer_command(port))}' says",
+    )
 
 
 def _settled(client: ViewerClient, recording: Path) -> bytes:
@@ -126,7 +163,7 @@ def _screenshot(client: ViewerClient, view_id: str | None = None) -> bytes:
 
 def _free_port() -> int:
     with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
+        probe.bind((LOCAL, 0))
         return int(probe.getsockname()[1])
 
 

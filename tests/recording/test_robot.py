@@ -11,12 +11,11 @@ from rerun.chunk import RrdReader
 from pipeline.artifacts.tensors import to_tensor
 from pipeline.config import RunConfig
 from pipeline.geometry.iiwa14 import LIMITS_RAD, LINKS
-from pipeline.recording.evaluate import blueprint, show_attempts
+from pipeline.recording.evaluate import blueprint, show_attempts, shown_robot
 from pipeline.recording.recording import Recorded, recording
 from pipeline.simulation.iiwa14 import flange_from_gripper
 from pipeline.stopwatch import Stopwatch
 from schemas.softgrip.v1.evaluation_pb2 import Attempt
-from stages.evaluate import shown_robot
 from tests.simulation.kinematics import flange_pose
 
 CONFIG = RunConfig()

@@ -17,9 +17,9 @@ from pipeline.interchange.object_grasps import ObjectGrasps
 from pipeline.interchange.reading import grasps_by_object
 from pipeline.interchange.tar_shards import CLASSES
 from pipeline.messages.objects import read_objects
+from pipeline.messages.samples import read_split
 from pipeline.network.samples import SPLITS, Samples
 from stages.export import Format, export_run
-from stages.shards import read_split
 
 LEAST = 0.6
 

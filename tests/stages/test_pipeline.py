@@ -10,11 +10,11 @@ from pipeline.artifacts import open_artifact, read_provenance
 from pipeline.artifacts.inspection import verified
 from pipeline.execution import RunFolder
 from pipeline.messages.objects import read_objects
+from pipeline.messages.samples import read_split
 from pipeline.messages.scenes import read_scenes
 from schemas.softgrip.v1.evaluation_pb2 import Attempt, Comparison, LevelResult
 from schemas.softgrip.v1.training_pb2 import TrainingResult
 from stages.graph import STAGES
-from stages.shards import read_split
 from tests.stages.conftest import TINY, run_stage
 
 
