@@ -334,7 +334,9 @@ def sized_network(bench: Bench) -> tuple[GaCnn, ControlPredictor]:
     """The network of the run and its export; its weights are untrained and change no time."""
     network = build_network(bench.config.network, seed=0).eval()
     threads = min(NETWORK_THREADS, os.cpu_count() or 1)
-    return network, ControlPredictor(export_onnx_bytes(network), threads)
+    return network, ControlPredictor(
+        export_onnx_bytes(network, bench.config.sensing.grid_cells), threads
+    )
 
 
 def control_steps(bench: Bench) -> dict[str, object]:

@@ -85,7 +85,7 @@ def tell(epoch: EpochMetrics) -> None:
 
 def export_for_control(stage: StageContext, trained: TrainedNetwork, test_set: Samples) -> bytes:
     """The network as ONNX, held against the original on test clouds."""
-    exported = export_onnx_bytes(trained.network)
+    exported = export_onnx_bytes(trained.network, stage.config.sensing.grid_cells)
     config = stage.config.train
     difference = checked_against(
         ControlPredictor(exported, config.threads),

@@ -25,8 +25,9 @@ def catalogue_object(
     source = MeshSource(name, name, "none", mesh, "m", "declared")
     value = nsvr(mesh)
     extent = float(mesh.extents_m.max())
+    multiple = extent / ObjectsConfig().r_g_m
     config = ObjectsConfig(
-        target_extent_min_m=extent, target_extent_max_m=extent, density_kg_m3=density_kg_m3
+        target_extent_min_rg=multiple, target_extent_max_rg=multiple, density_kg_m3=density_kg_m3
     )
     measured = MeasuredObject(source, mesh, (), value, shape_class(value), describe(mesh))
     return finish_object(measured, config, np.random.default_rng(0), cache)

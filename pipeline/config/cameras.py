@@ -1,17 +1,17 @@
 """[cameras]: what looks at the scenes, from where, and which renderer draws what it sees."""
 
 import math
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from pipeline.config.section import Section
+from pipeline.config.section import LengthInMetres, ScaledSection, Section
 
 DepthSensor = Literal["ideal", "time-of-flight", "lidar", "structured-light"]
 RendererName = Literal["auto", "sapien", "embree"]
 
 
-class DepthCameraConfig(Section):
+class DepthCameraConfig(ScaledSection):
     """A pinhole depth camera; what it measures wrongly is its sensor's."""
 
     width_px: int = Field(ge=16, le=4096, description="width of the depth image")
@@ -31,6 +31,8 @@ class DepthCameraConfig(Section):
 class StaticCameraConfig(DepthCameraConfig):
     """A camera fixed beside the table, looking at its middle; defaults: Kinect v2."""
 
+    distance_m: ClassVar[LengthInMetres] = LengthInMetres()
+
     width_px: int = Field(512, ge=16, le=4096, description="Kinect v2 depth image: 512")
     height_px: int = Field(424, ge=16, le=4096, description="Kinect v2 depth image: 424")
     vertical_fov_rad: float = Field(
@@ -39,7 +41,7 @@ class StaticCameraConfig(DepthCameraConfig):
     near_m: float = Field(0.5, gt=0, description="nearest measurable depth; Kinect v2: 0.5 [m]")
     far_m: float = Field(4.5, gt=0, description="farthest measurable depth; Kinect v2: 4.5 [m]")
     sensor: DepthSensor = Field("time-of-flight", description="noise model of Disturb, S-1.15")
-    distance_m: float = Field(0.90, gt=0.05, description="from the clutter's centre [m]")
+    distance_rg: float = Field(36.0, gt=2.0, description="from the clutter's centre [r_G]")
     elevations_rad: tuple[float, ...] = Field(
         (1.30,), min_length=1, description="angle above the table, one a viewpoint [rad]"
     )
@@ -57,6 +59,8 @@ class StaticCameraConfig(DepthCameraConfig):
 class WristCameraConfig(DepthCameraConfig):
     """The camera beside the gripper, each viewpoint above an object; defaults: RealSense L515."""
 
+    distance_m: ClassVar[LengthInMetres] = LengthInMetres()
+
     width_px: int = Field(640, ge=16, le=4096, description="L515 depth stream: 640 (VGA mode)")
     height_px: int = Field(480, ge=16, le=4096, description="L515 depth stream: 480 (VGA mode)")
     vertical_fov_rad: float = Field(
@@ -66,7 +70,7 @@ class WristCameraConfig(DepthCameraConfig):
     far_m: float = Field(9.0, gt=0, description="farthest measurable depth; L515: 9 [m]")
     sensor: DepthSensor = Field("lidar", description="noise model of Disturb, S-1.15")
     viewpoints: int = Field(2, ge=0, le=32, description="places the wrist goes to in each scene")
-    distance_m: float = Field(0.45, gt=0.05, description="from the object looked at [m]")
+    distance_rg: float = Field(18.0, gt=2.0, description="from the object looked at [r_G]")
     elevation_min_rad: float = Field(
         1.2, gt=0, le=math.pi / 2, description="flattest look at an object [rad]"
     )

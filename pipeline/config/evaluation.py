@@ -1,11 +1,11 @@
 """[evaluate] and [recording]: the closed loop, and what recordings show."""
 
 import math
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from pipeline.config.section import Section
+from pipeline.config.section import LengthInMetres, ScaledSection, Section
 
 RobotName = Literal["floating", "iiwa14"]
 PolicyName = Literal["closed-loop", "uncorrected", "open-loop", "geometric"]
@@ -20,32 +20,41 @@ class SuctionConfig(Section):
     seal_min: float = Field(0.05, ge=0, le=1, description="least p that closes the joint [1]")
 
 
-class LiftConfig(Section):
+class LiftConfig(ScaledSection):
     """When a grasp counts."""
 
-    height_m: float = Field(0.10, gt=0, description="lift that counts [m]")
+    height_m: ClassVar[LengthInMetres] = LengthInMetres()
+
+    height_rg: float = Field(4.0, gt=0, description="lift that counts [r_G]")
     hold_s: float = Field(1.0, gt=0, description="time the object must stay up [s]")
     shake_m: float = Field(0.005, ge=0, description="amplitude of the shake before that [m]")
     shake_hz: float = Field(2.0, gt=0, description="frequency of the shake [Hz]")
     shake_s: float = Field(0.5, ge=0, description="time of the shake [s]")
 
 
-class HandConfig(Section):
+class HandConfig(ScaledSection):
     """The gripper's rigid part and the camera on it, in GCS: +z from the pad to the flange."""
 
-    length_m: float = Field(0.20, gt=0.05, le=1, description="pad to flange [m]")
-    stem_radius_m: float = Field(
-        0.012, gt=0, le=0.1, description="radius of the rigid stem above the pad [m]"
+    length_m: ClassVar[LengthInMetres] = LengthInMetres()
+    stem_radius_m: ClassVar[LengthInMetres] = LengthInMetres()
+    stem_begins_m: ClassVar[LengthInMetres] = LengthInMetres()
+    camera_aside_m: ClassVar[LengthInMetres] = LengthInMetres()
+    camera_above_m: ClassVar[LengthInMetres] = LengthInMetres()
+    camera_focus_m: ClassVar[LengthInMetres] = LengthInMetres()
+
+    length_rg: float = Field(8.0, gt=2.0, le=40.0, description="pad to flange [r_G]")
+    stem_radius_rg: float = Field(
+        0.48, gt=0, le=4.0, description="radius of the rigid stem above the pad [r_G]"
     )
-    stem_begins_m: float = Field(
-        0.035, gt=0, le=1, description="where the stem begins, past the pad's altitude H [m]"
+    stem_begins_rg: float = Field(
+        1.4, gt=0, le=40.0, description="where the stem begins, past the pad's altitude H [r_G]"
     )
-    camera_aside_m: float = Field(
-        0.16, ge=0, le=0.5, description="camera off the axis, along x [m]"
+    camera_aside_rg: float = Field(
+        6.4, ge=0, le=20.0, description="camera off the axis, along x [r_G]"
     )
-    camera_above_m: float = Field(0.18, gt=0, le=0.5, description="camera above the pad [m]")
-    camera_focus_m: float = Field(
-        0.15, gt=0, le=2, description="where its axis meets the gripper's, below the pad [m]"
+    camera_above_rg: float = Field(7.2, gt=0, le=20.0, description="camera above the pad [r_G]")
+    camera_focus_rg: float = Field(
+        6.0, gt=0, le=80.0, description="where its axis meets the gripper's, below the pad [r_G]"
     )
     camera_radius_m: float = Field(
         0.031,
@@ -56,8 +65,8 @@ class HandConfig(Section):
 
     @model_validator(mode="after")
     def _stem_is_there(self) -> Self:
-        if self.stem_begins_m + 2 * self.stem_radius_m >= self.length_m:
-            raise ValueError("length_m must exceed stem_begins_m + 2 stem_radius_m")
+        if self.stem_begins_rg + 2 * self.stem_radius_rg >= self.length_rg:
+            raise ValueError("length_rg must exceed stem_begins_rg + 2 stem_radius_rg")
         return self
 
 
@@ -72,8 +81,20 @@ class ArmConfig(Section):
     )
 
 
-class PolicyConfig(Section):
+class PolicyConfig(ScaledSection):
     """Candidates and the closed loop; Supplement VI."""
+
+    wrist_view_m: ClassVar[LengthInMetres] = LengthInMetres()
+    standoff_m: ClassVar[LengthInMetres] = LengthInMetres()
+    correction_radius_m: ClassVar[LengthInMetres] = LengthInMetres()
+    commit_m: ClassVar[LengthInMetres] = LengthInMetres()
+    look_m: ClassVar[LengthInMetres] = LengthInMetres()
+    another_m: ClassVar[LengthInMetres] = LengthInMetres()
+    regrasp_lever_m: ClassVar[LengthInMetres] = LengthInMetres()
+    regrasp_radius_m: ClassVar[LengthInMetres] = LengthInMetres()
+    smoothing_m: ClassVar[LengthInMetres] = LengthInMetres()
+    avoid_radius_m: ClassVar[LengthInMetres] = LengthInMetres()
+    slip_m: ClassVar[LengthInMetres] = LengthInMetres()
 
     candidates: int = Field(128, ge=1, le=4096, description="u, sub clouds of the global phase")
     local_candidates: int = Field(48, ge=1, le=4096, description="u of each step on the way down")
@@ -83,7 +104,9 @@ class PolicyConfig(Section):
         le=8,
         description="looks of the wrist before the choice; at what depth misses, two for one",
     )
-    wrist_view_m: float = Field(0.28, gt=0.05, le=2, description="pad above what it looks at [m]")
+    wrist_view_rg: float = Field(
+        11.2, gt=2.0, le=80.0, description="pad above what it looks at [r_G]"
+    )
     tilt_max_rad: float = Field(
         math.radians(50), ge=0, lt=math.pi / 2, description="approach off the vertical [rad]"
     )
@@ -91,25 +114,25 @@ class PolicyConfig(Section):
     approach_max_s: float = Field(
         10.0, gt=0.5, le=120, description="longest way down, corrections and all [s]"
     )
-    standoff_m: float = Field(0.20, gt=0.02, le=1, description="where the approach begins [m]")
-    correction_radius_m: float = Field(
-        0.015, ge=0, description="how far one correction may move the contact [m]"
+    standoff_rg: float = Field(8.0, gt=0.8, le=40.0, description="where the approach begins [r_G]")
+    correction_radius_rg: float = Field(
+        0.6, ge=0, description="how far one correction may move the contact [r_G]"
     )
     correction_tilt_rad: float = Field(
         0.3, gt=0, le=math.pi, description="how far one correction may turn the approach [rad]"
     )
-    commit_m: float = Field(
-        0.03, ge=0, description="this near to the contact nothing is corrected any more [m]"
+    commit_rg: float = Field(
+        1.2, ge=0, description="this near to the contact nothing is corrected any more [r_G]"
     )
-    look_m: float = Field(
-        0.06,
+    look_rg: float = Field(
+        2.4,
         gt=0,
-        description="radius looked at around the aim: the pad and a correction [m]",
+        description="radius looked at around the aim: the pad and a correction [r_G]",
     )
-    another_m: float = Field(
-        0.03,
+    another_rg: float = Field(
+        1.2,
         ge=0,
-        description="another place is at least so far from each given up in the attempt [m]",
+        description="another place is at least so far from each given up in the attempt [r_G]",
     )
     retargets: int = Field(
         3, ge=0, description="how often another candidate may be taken after a closer look"
@@ -126,20 +149,22 @@ class PolicyConfig(Section):
     regrasp_quality: float = Field(
         0.0, ge=0, le=1, description="least q-hat of another place after a seal that failed [1]"
     )
-    regrasp_lever_m: float = Field(
-        0.015, ge=0, description="lever felt in the tug from which the centre is aimed at [m]"
+    regrasp_lever_rg: float = Field(
+        0.6, ge=0, description="lever felt in the tug from which the centre is aimed at [r_G]"
     )
-    regrasp_radius_m: float = Field(
-        0.025, gt=0, description="how near to the load's centre a regrasp is sought [m]"
+    regrasp_radius_rg: float = Field(
+        1.0, gt=0, description="how near to the load's centre a regrasp is sought [r_G]"
     )
     new_choices: int = Field(
         2, ge=0, description="how often all is chosen anew where nothing is left near the aim"
     )
-    smoothing_m: float = Field(
-        0.007, ge=0, description="q-hat is averaged over neighbours this near [m]"
+    smoothing_rg: float = Field(
+        0.28, ge=0, description="q-hat is averaged over neighbours this near [r_G]"
     )
-    avoid_radius_m: float = Field(
-        0.02, ge=0, description="no second try this near to a failed one while there is another [m]"
+    avoid_radius_rg: float = Field(
+        0.8,
+        ge=0,
+        description="no second try this near to a failed one while there is another [r_G]",
     )
     travel_m_s: float = Field(0.8, gt=0, le=3, description="speed in free space [m/s]")
     speed_m_s: float = Field(0.25, gt=0, le=2, description="speed of approach and lift [m/s]")
@@ -150,8 +175,8 @@ class PolicyConfig(Section):
     tension_min_n: float = Field(
         0.003, gt=0, description="least pull on the base that tells a held object: 0.3 g [N]"
     )
-    slip_m: float = Field(
-        0.008, gt=0, description="shift of the load's line in one step that is a slip [m]"
+    slip_rg: float = Field(
+        0.32, gt=0, description="shift of the load's line in one step that is a slip [r_G]"
     )
     trim_max_rad: float = Field(
         math.radians(12), ge=0, lt=1, description="most the lift may tilt to lessen moments [rad]"

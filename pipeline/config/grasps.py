@@ -1,11 +1,11 @@
 """[gripper], [grasps] and [sensing]: the pad, the labels, the sub point cloud."""
 
 import math
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from pipeline.config.section import Section
+from pipeline.config.section import LengthInMetres, ScaledSection, Section
 
 CELL_SIDE = 0.1  # side of a sub cloud's cell in units of r_G: 60 mm in 24 cells over 25 mm
 
@@ -15,22 +15,33 @@ SolverName = Literal["structured", "piqp-sparse", "piqp-dense", "clarabel"]
 class PadConfig(Section):
     """The soft pad's geometry: Table I."""
 
-    seal_radius_m: float = Field(0.020, gt=0, description="r_v, radius of Reg.V; Table I [m]")
+    seal_radius_m: ClassVar[LengthInMetres] = LengthInMetres()
+    altitude_m: ClassVar[LengthInMetres] = LengthInMetres()
+    radius_step_m: ClassVar[LengthInMetres] = LengthInMetres()
+    distance_step_m: ClassVar[LengthInMetres] = LengthInMetres()
+    contact_tolerance_m: ClassVar[LengthInMetres] = LengthInMetres()
+
+    @property
+    def r_g_m(self) -> float:
+        """r_G, the pad's own radius [m]."""
+        return self.radius_m
+
+    seal_radius_rg: float = Field(0.8, gt=0, description="r_v, radius of Reg.V; Table I [r_G]")
     radius_m: float = Field(0.025, gt=0, description="r_G, radius of the pad; Table I [m]")
-    altitude_m: float = Field(0.030, gt=0, description="H, altitude of the pad; Table I [m]")
+    altitude_rg: float = Field(1.2, gt=0, description="H, altitude of the pad; Table I [r_G]")
     rotation_step_rad: float = Field(
         0.045 * math.pi, gt=0, le=math.pi / 2, description="Delta_theta; Table I [rad]"
     )
-    radius_step_m: float = Field(0.002, gt=0, description="Delta_r, upper bound; Table I [m]")
-    distance_step_m: float = Field(0.002, gt=0, description="Delta_d; Table I [m]")
-    contact_tolerance_m: float = Field(
-        1e-4, ge=0, description="a vertex this near the surface is in contact; reading.md [m]"
+    radius_step_rg: float = Field(0.08, gt=0, description="Delta_r, upper bound; Table I [r_G]")
+    distance_step_rg: float = Field(0.08, gt=0, description="Delta_d; Table I [r_G]")
+    contact_tolerance_rg: float = Field(
+        0.004, ge=0, description="a vertex this near the surface is in contact; reading.md [r_G]"
     )
 
     @model_validator(mode="after")
     def _seal_inside_pad(self) -> Self:
-        if self.seal_radius_m > self.radius_m:
-            raise ValueError("seal_radius_m must not exceed radius_m")
+        if self.seal_radius_rg > 1:
+            raise ValueError("seal_radius_rg must not exceed 1, which is r_G itself")
         return self
 
 
@@ -47,8 +58,12 @@ class GripperConfig(Section):
     solver: SolverName = Field("structured", description="which solver of the quality QP labels")
 
 
-class GraspsConfig(Section):
+class GraspsConfig(ScaledSection):
     """How many grasps, where they are tried, and how they are batched."""
+
+    nearby_radius_m: ClassVar[LengthInMetres] = LengthInMetres()
+    normal_radius_m: ClassVar[LengthInMetres] = LengthInMetres()
+    clearance_m: ClassVar[LengthInMetres] = LengthInMetres()
 
     count: int = Field(5000, ge=1, description="labelled grasps wanted in all")
     oversampling: float = Field(
@@ -63,8 +78,8 @@ class GraspsConfig(Section):
     nearby_share: float = Field(
         0.6, ge=0, lt=1, description="share of candidates proposed near rare labels [1]"
     )
-    nearby_radius_m: float = Field(
-        0.004, gt=0, description="step of the contact to a nearby proposal [m]"
+    nearby_radius_rg: float = Field(
+        0.16, gt=0, description="step of the contact to a nearby proposal [r_G]"
     )
     nearby_tilt_rad: float = Field(
         0.08, ge=0, description="step of the approach to a nearby proposal [rad]"
@@ -78,11 +93,11 @@ class GraspsConfig(Section):
         le=math.pi / 2,
         description="largest angle at which a camera sees a contact or a tilted approach [rad]",
     )
-    normal_radius_m: float = Field(
-        0.010, gt=0, description="surface normal is the mean over this radius [m]"
+    normal_radius_rg: float = Field(
+        0.4, gt=0, description="surface normal is the mean over this radius [r_G]"
     )
-    clearance_m: float = Field(
-        0.15, gt=0, description="height above the contact from which the pad descends [m]"
+    clearance_rg: float = Field(
+        6.0, gt=0, description="height above the contact from which the pad descends [r_G]"
     )
     merged_share: float = Field(
         0.5,
@@ -94,18 +109,23 @@ class GraspsConfig(Section):
     samples_per_message: int = Field(256, ge=1, le=8192)
 
 
-class SensingConfig(Section):
+class SensingConfig(ScaledSection):
     """From a rendered depth image to the sample's cloud: S-1.13 - S-1.15."""
+
+    grid_side_m: ClassVar[LengthInMetres] = LengthInMetres()
+    grid_depth_m: ClassVar[LengthInMetres] = LengthInMetres()
+    grid_height_m: ClassVar[LengthInMetres] = LengthInMetres()
+    layer_m: ClassVar[LengthInMetres] = LengthInMetres()
 
     disturbed: bool = Field(True, description="whether the sensors' noise is added; S-1.15")
     grid_cells: int = Field(24, ge=8, le=128, description="cells a side; Supplement III: 24")
-    grid_side_m: float = Field(0.06, gt=0, description="side of the square around the pad [m]")
-    grid_depth_m: float = Field(
-        0.03, gt=0, description="points farther than this below the contact are left out [m]"
+    grid_side_rg: float = Field(2.4, gt=0, description="side of the square around the pad [r_G]")
+    grid_depth_rg: float = Field(
+        1.2, gt=0, description="points farther than this below the contact are left out [r_G]"
     )
-    grid_height_m: float = Field(
-        0.15, gt=0, description="points farther than this above the contact are left out [m]"
+    grid_height_rg: float = Field(
+        6.0, gt=0, description="points farther than this above the contact are left out [r_G]"
     )
-    layer_m: float = Field(
-        0.005, gt=0, description="a cell holds the mean of its points this near its highest [m]"
+    layer_rg: float = Field(
+        0.2, gt=0, description="a cell holds the mean of its points this near its highest [r_G]"
     )

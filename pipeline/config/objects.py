@@ -1,10 +1,10 @@
 """[objects] and [split]: from meshes to the object catalogue."""
 
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from pipeline.config.section import Section
+from pipeline.config.section import LengthInMetres, ScaledSection, Section
 
 
 class ConvexPartsConfig(Section):
@@ -23,8 +23,11 @@ class ConvexPartsConfig(Section):
     )
 
 
-class ObjectsConfig(Section):
+class ObjectsConfig(ScaledSection):
     """Mesh intake: units, repair bounds, rescaling, physical properties."""
+
+    target_extent_min_m: ClassVar[LengthInMetres] = LengthInMetres()
+    target_extent_max_m: ClassVar[LengthInMetres] = LengthInMetres()
 
     limit: int = Field(0, ge=0, description="most objects taken, spread over classes; 0 = all")
     embedded_in_training: bool = Field(
@@ -49,11 +52,11 @@ class ObjectsConfig(Section):
     rescaled: bool = Field(
         True, description="false keeps every object's own size, as with a URDF's scale"
     )
-    target_extent_min_m: float = Field(
-        0.06, gt=0, description="smallest longest-extent after rescaling [m]; Supplement III"
+    target_extent_min_rg: float = Field(
+        2.4, gt=0, description="smallest longest-extent after rescaling [r_G]; Supplement III"
     )
-    target_extent_max_m: float = Field(
-        0.16, gt=0, description="largest longest-extent after rescaling [m]; Supplement III"
+    target_extent_max_rg: float = Field(
+        6.4, gt=0, description="largest longest-extent after rescaling [r_G]; Supplement III"
     )
     density_kg_m3: float = Field(300.0, gt=0, description="mass from the closed mesh [kg/m3]")
     transparent: tuple[str, ...] = Field(
@@ -63,8 +66,8 @@ class ObjectsConfig(Section):
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
-        if self.target_extent_min_m > self.target_extent_max_m:
-            raise ValueError("target_extent_min_m must not exceed target_extent_max_m")
+        if self.target_extent_min_rg > self.target_extent_max_rg:
+            raise ValueError("target_extent_min_rg must not exceed target_extent_max_rg")
         return self
 
 

@@ -1,10 +1,10 @@
 """[scenes]: clutter of the nine levels and how it comes to rest."""
 
-from typing import Self
+from typing import ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from pipeline.config.section import Section
+from pipeline.config.section import LengthInMetres, ScaledSection, Section
 
 
 class ClutterCounts(Section):
@@ -15,8 +15,11 @@ class ClutterCounts(Section):
     test: int = Field(1, ge=0, description="also the clutters of the closed-loop evaluation")
 
 
-class ScenesConfig(Section):
+class ScenesConfig(ScaledSection):
     """Clutter scenes of Table II and how they come to rest."""
+
+    workspace_side_m: ClassVar[LengthInMetres] = LengthInMetres()
+    table_side_m: ClassVar[LengthInMetres] = LengthInMetres()
 
     levels: tuple[int, ...] = Field(
         (1, 2, 3, 4, 5, 6, 7, 8, 9), min_length=1, description="clutter levels; Table II"
@@ -26,14 +29,16 @@ class ScenesConfig(Section):
     isolated_gap_min_m: float = Field(0.05, gt=0, description="Supplement V: 5 cm [m]")
     multiple_gap_max_m: float = Field(0.01, gt=0, description="Supplement V: 1 cm [m]")
     placement_attempts: int = Field(60, ge=1, description="tries at one clutter before giving up")
-    workspace_side_m: float = Field(
-        0.85, gt=0.1, le=5, description="side of the square that objects are placed in [m]"
+    workspace_side_rg: float = Field(
+        34.0, gt=4.0, le=200.0, description="side of the square that objects are placed in [r_G]"
     )
     touch_gap_max_m: float = Field(
         0.002, gt=0, description="stacked objects this near touch, on the true meshes [m]"
     )
     sink_max_m: float = Field(0.001, gt=0, description="deepest allowed interpenetration [m]")
-    table_side_m: float = Field(1.2, gt=0.2, le=5, description="side of the square table [m]")
+    table_side_rg: float = Field(
+        48.0, gt=8.0, le=200.0, description="side of the square table [r_G]"
+    )
     friction: float = Field(0.5, ge=0, le=2, description="object-object and object-table; mu [1]")
     timestep_s: float = Field(1 / 240, gt=0, le=0.02, description="physics step [s]")
     settle_linear_m_s: float = Field(0.005, gt=0, description="at rest below this speed [m/s]")
@@ -46,6 +51,6 @@ class ScenesConfig(Section):
         unknown = [level for level in self.levels if not 1 <= level <= 9]
         if unknown:
             raise ValueError(f"levels go from 1 to 9 (Table II), got {unknown}")
-        if self.workspace_side_m > self.table_side_m:
-            raise ValueError("workspace_side_m must not exceed table_side_m")
+        if self.workspace_side_rg > self.table_side_rg:
+            raise ValueError("workspace_side_rg must not exceed table_side_rg")
         return self

@@ -23,19 +23,33 @@ from pydantic import Field, ValidationError, model_validator
 from pipeline.config.cameras import CamerasConfig
 from pipeline.config.dataset import DatasetConfig
 from pipeline.config.evaluation import EvaluateConfig, RecordingConfig
-from pipeline.config.grasps import CELL_SIDE, GraspsConfig, GripperConfig, SensingConfig
+from pipeline.config.grasps import CELL_SIDE, GraspsConfig, GripperConfig, PadConfig, SensingConfig
 from pipeline.config.learning import NetworkConfig, ShardsConfig, SweepConfig, TrainConfig
 from pipeline.config.objects import ObjectsConfig, SplitConfig
 from pipeline.config.predict import PredictConfig
 from pipeline.config.referee import RefereeConfig
 from pipeline.config.scenes import ScenesConfig
-from pipeline.config.section import Section
+from pipeline.config.section import Section, with_radius
 from pipeline.errors import ConfigError
 
 # A key a.a.a... costs its reader the square of its parts; strings may hold any number of dots.
 _DEEP_KEY = re.compile(r"(?<![^\s.,=\[\]{}#])(?:[^\s.,=\[\]{}#]+[ \t]*\.[ \t]*){32}")
 _NO_KEY = re.compile(r'"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\'|#[^\n]*')  # strings, comments
 _LONGEST_SHOWN = 80
+
+
+# Sections with lengths that are multiples of r_G, by the names that lead to them.
+SCALED = (
+    ("objects",),
+    ("scenes",),
+    ("cameras", "static"),
+    ("cameras", "wrist"),
+    ("sensing",),
+    ("grasps",),
+    ("evaluate", "lift"),
+    ("evaluate", "hand"),
+    ("evaluate", "policy"),
+)
 
 
 class RunConfig(Section):
@@ -59,30 +73,52 @@ class RunConfig(Section):
     recording: RecordingConfig = RecordingConfig()
     dataset: DatasetConfig = DatasetConfig()
 
+    @model_validator(mode="before")
+    @classmethod
+    def _lengths_follow_the_pad(cls, values: Any) -> Any:
+        """Write r_G into every section whose lengths are multiples of it."""
+        radius_m = _pad_radius_m(values)
+        if radius_m is not None:
+            for path in SCALED:
+                values = with_radius(values, radius_m, path)
+        return values
+
     @model_validator(mode="after")
     def _stem_is_above_the_pad(self) -> Self:
-        if self.evaluate.hand.stem_begins_m < self.gripper.pad.altitude_m:
-            raise ValueError("evaluate.hand.stem_begins_m is within gripper.pad.altitude_m")
+        if self.evaluate.hand.stem_begins_rg < self.gripper.pad.altitude_rg:
+            raise ValueError("evaluate.hand.stem_begins_rg is within gripper.pad.altitude_rg")
         return self
 
     @model_validator(mode="after")
     def _clouds_show_what_labels_meet(self) -> Self:
-        if self.sensing.grid_height_m < self.grasps.clearance_m:
+        if self.sensing.grid_height_rg < self.grasps.clearance_rg:
             raise ValueError(
-                "sensing.grid_height_m is less than grasps.clearance_m: labels would meet "
+                "sensing.grid_height_rg is less than grasps.clearance_rg: labels would meet "
                 "obstacles that no cloud shows"
             )
         return self
 
     @model_validator(mode="after")
     def _cells_are_as_the_network_reads_them(self) -> Self:
-        cell = self.sensing.grid_side_m / self.sensing.grid_cells / self.gripper.pad.radius_m
+        cell = self.sensing.grid_side_rg / self.sensing.grid_cells
         if not math.isclose(cell, CELL_SIDE, rel_tol=1e-6):
             raise ValueError(
-                f"sensing.grid_side_m / grid_cells is {cell:.4g} of gripper.pad.radius_m, and the "
-                f"network reads cells of {CELL_SIDE}"
+                f"sensing.grid_side_rg / grid_cells is {cell:.4g}, and the network reads cells of "
+                f"{CELL_SIDE} r_G"
             )
         return self
+
+
+def _pad_radius_m(values: Any) -> float | None:
+    """r_G of what a run is made of; None where it is none, which pydantic then tells."""
+    for name in ("gripper", "pad", "radius_m"):
+        if isinstance(values, Section):
+            values = getattr(values, name)
+        elif isinstance(values, Mapping):
+            values = values.get(name, PadConfig().radius_m if name == "radius_m" else {})
+        else:
+            return None
+    return float(values) if isinstance(values, int | float) and values > 0 else None
 
 
 def load_run_config(path: Path) -> RunConfig:

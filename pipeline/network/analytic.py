@@ -118,7 +118,7 @@ def measured_quality(
     """
     radius_m = gripper.pad.radius_m
     config = gripper.model_copy(
-        update={"pad": gripper.pad.model_copy(update={"contact_tolerance_m": tolerance * radius_m})}
+        update={"pad": gripper.pad.model_copy(update={"contact_tolerance_rg": tolerance})}
     )
     pad = build_pad(config.pad)
     at = pad.vertices_xy_m / radius_m

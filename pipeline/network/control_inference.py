@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float
 from pipeline.errors import ArtifactError, ContentError
 from pipeline.network.canonical import CHANNELS, network_input
 from pipeline.network.control_input import control_input
-from pipeline.network.export import GRID, REMEDY, check_onnx_bytes
+from pipeline.network.export import REMEDY, check_onnx_bytes
 from pipeline.network.ga_cnn import GaCnn
 from pipeline.network.inference import predict
 from pipeline.network.training import reproducible
@@ -42,9 +42,10 @@ class ControlPredictor:
         ------
         ContentError : the bytes are no such export, or of another version.
         """
-        self._channels = check_onnx_bytes(data)
+        taken = check_onnx_bytes(data)
+        self._channels, self._cells = taken.channels, taken.cells
         try:
-            compiled = _compiled(data, (len(self._channels), *GRID), threads)
+            compiled = _compiled(data, (len(self._channels), self._cells, self._cells), threads)
         # Its messages may quote the bytes of a damaged model, which need not be text.
         except (RuntimeError, UnicodeDecodeError) as error:
             reason = str(error).strip().rpartition("\n")[2]
@@ -55,7 +56,19 @@ class ControlPredictor:
     def predict(
         self, cloud: Float[np.ndarray, "n h w 3"], mask: Bool[np.ndarray, "n h w"]
     ) -> Float[np.ndarray, " n"]:
-        """Predicted quality q̂ in [0, 1]; clouds and masks as for ``inference.predict``."""
+        """Predicted quality q̂ in [0, 1]; clouds and masks as for ``inference.predict``.
+
+        Raises
+        ------
+        ContentError
+            The clouds have other cells than the network was trained on.
+        """
+        if cloud.shape[1:3] != (self._cells, self._cells):
+            raise ContentError(
+                f"clouds of {cloud.shape[1]} by {cloud.shape[2]} cells, and the network takes "
+                f"{self._cells} by {self._cells}",
+                "Set sensing.grid_cells to what the network was trained on, or train another",
+            )
         predicted = np.empty(len(cloud), dtype=np.float32)
         for start in range(0, len(cloud), _PART):
             some = slice(start, start + _PART)

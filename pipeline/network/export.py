@@ -7,6 +7,7 @@ import math
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 import onnx
 import torch
@@ -20,7 +21,6 @@ from pipeline.network.ga_cnn import GaCnn
 
 FORMAT = "softgrip.ga-cnn.onnx"
 FORMAT_VERSION = 1
-GRID = (24, 24)
 REMEDY = "Export the network again."
 
 _INPUT, _OUTPUT = "inputs", "quality"
@@ -35,9 +35,33 @@ _OPERATORS = frozenset(
 _MOST_VALUES = 1 << 21
 
 
-def export_onnx_bytes(network: GaCnn) -> bytes:
-    """The network as ONNX for canonical inputs of any batch; equal networks give equal bytes."""
-    example = torch.zeros(2, len(network.channels), *GRID)
+@dataclass(frozen=True)
+class ExportedInput:
+    """What an exported network takes.
+
+    Attributes
+    ----------
+    channels
+        The channels of its input, see `pipeline.network.canonical`.
+    cells
+        Cells a side of its clouds: `sensing.grid_cells` of the run that trained it.
+    """
+
+    channels: Channels
+    cells: int
+
+
+def export_onnx_bytes(network: GaCnn, cells: int) -> bytes:
+    """The network as ONNX for canonical inputs of any batch; equal networks give equal bytes.
+
+    Parameters
+    ----------
+    network
+        What is exported; it stays as it is.
+    cells
+        Cells a side of the clouds that it will be asked about.
+    """
+    example = torch.zeros(2, len(network.channels), cells, cells)
     network = _without_matrix_products(network).eval()
     network = network.to(memory_format=torch.contiguous_format)  # type: ignore[call-overload]
     with _quiet_exporter():
@@ -86,16 +110,17 @@ def _without_matrix_products(network: GaCnn) -> GaCnn:
     return network
 
 
-def check_onnx_bytes(data: bytes) -> Channels:
+def check_onnx_bytes(data: bytes) -> ExportedInput:
     """Hold bytes against what ``export_onnx_bytes`` makes, before anything runs them.
 
     Returns
     -------
-    The channels of its input.
+    What it takes.
 
     Raises
     ------
-    ContentError : they are no such export, or of another version.
+    ContentError
+        They are no such export, or of another version.
     """
     try:
         model = onnx.load_from_string(data)
@@ -113,7 +138,14 @@ def check_onnx_bytes(data: bytes) -> Channels:
     properties = {p.key: p.value for p in model.metadata_props}
     for channels in KNOWN_CHANNELS:
         if properties == _metadata(channels):
-            return channels
+            sides = [d.dim_value for d in model.graph.input[0].type.tensor_type.shape.dim[1:]]
+            if len(sides) != 3 or sides[0] != len(channels) or not 0 < sides[1] == sides[2]:
+                raise ContentError(
+                    f"exported network takes arrays of {sides}, not of {len(channels)} channels "
+                    "by cells by cells",
+                    REMEDY,
+                )
+            return ExportedInput(channels, sides[1])
     raise ContentError(
         f"exported network is marked {properties}, "
         f"this program reads {_metadata(KNOWN_CHANNELS[0])}",

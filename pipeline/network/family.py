@@ -31,8 +31,6 @@ from pipeline.network.training import TrainedNetwork
 Variant = Literal["ga-cnn", "no attention", "no augmentation"]
 VARIANTS: tuple[Variant, ...] = ("ga-cnn", "no attention", "no augmentation")
 
-_CELLS = 24
-
 
 @dataclass(frozen=True)
 class Member:
@@ -168,7 +166,7 @@ def measure_member(
         test_mae_averaged=mean_absolute_error(averaged, test.quality),
         by_class=error_by_group(usual, test.quality, CLASSES[test.shape_class]),
         parameters=parameter_count(trained.network),
-        multiply_adds=multiply_adds(trained.network),
+        multiply_adds=multiply_adds(trained.network, test.cloud_mask.shape[1]),
     )
 
 
@@ -190,9 +188,9 @@ def time_network_ms(config: NetworkConfig, test: Samples, batch: int, threads: i
     return time
 
 
-def multiply_adds(network: GaCnn) -> int:
-    """Multiplications with addition that one grasp costs, as the convolutions' sizes say."""
-    example = torch.zeros(1, len(network.channels), _CELLS, _CELLS)
+def multiply_adds(network: GaCnn, cells: int) -> int:
+    """Multiplications with addition for one grasp of cells by cells, by the layers' sizes."""
+    example = torch.zeros(1, len(network.channels), cells, cells)
     with FlopCounterMode(display=False) as counter, torch.inference_mode():
         network.eval()(example)
     return int(counter.get_total_flops()) // 2

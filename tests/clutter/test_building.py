@@ -82,7 +82,7 @@ def test_the_same_seed_gives_the_same_bits(pool: list[CatalogueObject]) -> None:
 
 def test_a_level_that_cannot_be_met_is_an_error_not_a_scene(pool: list[CatalogueObject]) -> None:
     crowded = ScenesConfig(
-        objects_per_clutter=12, workspace_side_m=0.2, table_side_m=0.3, placement_attempts=2
+        objects_per_clutter=12, workspace_side_rg=8, table_side_rg=12, placement_attempts=2
     )
     with pytest.raises(SceneError, match="no clutter of level 1 in 2 tries"):
         build_clutter("s", 1, "train", pool, crowded, seed=0)
@@ -103,7 +103,7 @@ def embedded(tmp_path_factory: pytest.TempPathFactory) -> dict[ShapeClass, list[
     """Four embedded objects of each class."""
     cache = tmp_path_factory.mktemp("embedded")
     convex = ConvexPartsConfig(input_faces=500)
-    config = ObjectsConfig(target_extent_max_m=0.12, convex=convex)
+    config = ObjectsConfig(target_extent_max_rg=4.8, convex=convex)
     pools: dict[ShapeClass, list[CatalogueObject]] = {kind: [] for kind in ShapeClass}
     for number, name in enumerate(sorted(PARAMETRIC_OBJECTS)):
         measured = measure_object(parametric_source(name), config)

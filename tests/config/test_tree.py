@@ -49,11 +49,12 @@ def test_table_one_is_the_default_pad() -> None:
         ("[gripper]\nsolver='magic'", r"'gripper\.solver' = 'magic'"),
         ("seed = nan", r"'seed'"),
         ("[gripper", r"is not valid TOML"),
-        ("[gripper.pad]\nseal_radius_m=0.1", r"must not exceed radius_m"),
-        ("[gripper.pad]\naltitude_m=0.09", r"stem_begins_m is within gripper\.pad\.altitude_m"),
-        ("[evaluate.hand]\nstem_radius_m=0.09", r"length_m must exceed stem_begins_m"),
-        ("[grasps]\nclearance_m=0.2", r"grid_height_m is less than grasps\.clearance_m"),
-        ("[sensing]\ngrid_cells=32", r"0\.075 of gripper\.pad\.radius_m, .* cells of 0\.1"),
+        ("[gripper.pad]\nseal_radius_rg=1.1", r"must not exceed 1"),
+        ("[gripper.pad]\naltitude_rg=3.6", r"stem_begins_rg is within gripper\.pad\.altitude_rg"),
+        ("[evaluate.hand]\nstem_radius_rg=3.6", r"length_rg must exceed stem_begins_rg"),
+        ("[grasps]\nclearance_rg=8", r"grid_height_rg is less than grasps\.clearance_rg"),
+        ("[sensing]\nr_g_m=0.03", r"r_g_m follows gripper\.pad\.radius_m"),
+        ("[sensing]\ngrid_cells=32", r"grid_side_rg / grid_cells is 0\.075, .* cells of 0\.1"),
     ],
 )
 def test_what_is_wrong_is_said(tmp_path: Path, text: str, said: str) -> None:

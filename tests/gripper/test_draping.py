@@ -14,7 +14,7 @@ from tests.gripper.surfaces import everywhere, plane
 
 CONFIG = GripperConfig()
 PAD = build_pad(CONFIG.pad)
-COARSE = build_pad(PadConfig(radius_step_m=0.006, rotation_step_rad=0.8))
+COARSE = build_pad(PadConfig(radius_step_rg=0.24, rotation_step_rad=0.8))
 
 
 def rough(seed: int, amplitude_m: float, missing: float, count: int) -> np.ndarray:

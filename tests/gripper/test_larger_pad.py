@@ -1,11 +1,13 @@
 """The 150 mm pad of Supplement VII: Table I times three, on surfaces three times as large."""
 
 import tomllib
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
-from pipeline.config import GripperConfig, PadConfig, RunConfig
+from pipeline.config import GripperConfig, RunConfig
+from pipeline.config.section import Section
 from pipeline.gripper import GraspStatus, build_pad, label_batch
 from tests.docs.pages import blocks_of
 from tests.gripper.surfaces import everywhere, plane, sphere, tilted
@@ -19,18 +21,46 @@ SHOWN = next(
 )
 
 
-def test_the_page_shows_table_one_times_three() -> None:
-    small, large = SMALL.pad.model_dump(), SHOWN.gripper.pad.model_dump()
-    scaled = [name for name in PadConfig.model_fields if name.endswith("_m")]
-    scaled.remove("contact_tolerance_m")  # of the surface, which is no rougher
-    for name in scaled:
-        assert large[name] == pytest.approx(TIMES * small[name]), name
-    assert SHOWN.sensing.grid_side_m == pytest.approx(TIMES * RunConfig().sensing.grid_side_m)
-    for name in ("grid_depth_m", "grid_height_m", "layer_m"):
-        expected = TIMES * getattr(RunConfig().sensing, name)
-        assert getattr(SHOWN.sensing, name) == pytest.approx(expected)
-    assert SHOWN.grasps.clearance_m == pytest.approx(TIMES * RunConfig().grasps.clearance_m)
-    assert SHOWN.evaluate.hand.stem_begins_m > SHOWN.gripper.pad.altitude_m
+def lengths_m(section: Section, name: str = "") -> dict[str, float]:
+    """Every length of a tree that is a multiple of r_G, in metres, by its dotted name."""
+    found: dict[str, float] = {}
+    for part, value in section:
+        if isinstance(value, Section):
+            found |= lengths_m(value, f"{name}{part}.")
+        elif part.endswith("_rg") and part.removesuffix("_rg") + "_m" in dir(section):
+            found[name + part] = getattr(section, part.removesuffix("_rg") + "_m")
+    return found
+
+
+def test_one_line_makes_every_length_that_grows_with_the_pad_three_times_as_long() -> None:
+    large = RunConfig.model_validate({"gripper": {"pad": {"radius_m": 0.075}}})
+    small_m, large_m = lengths_m(RunConfig()), lengths_m(large)
+    assert len(small_m) > 25
+    for name in small_m:
+        assert large_m[name] == pytest.approx(TIMES * small_m[name]), name
+
+
+def test_another_gripper_is_at_most_eight_lines() -> None:
+    block = next(b for b in blocks_of("runs/README.md", "toml") if "[gripper.pad]" in b)
+    assert len([line for line in block.splitlines() if line.strip()]) <= 8
+
+
+@pytest.mark.parametrize(
+    ("read", "metres"),
+    [
+        (lambda c: c.gripper.pad.seal_radius_m, 0.020),
+        (lambda c: c.gripper.pad.contact_tolerance_m, 1e-4),
+        (lambda c: c.sensing.grid_side_m, 0.06),
+        (lambda c: c.grasps.clearance_m, 0.15),
+        (lambda c: c.grasps.normal_radius_m, 0.010),
+        (lambda c: c.evaluate.hand.camera_above_m, 0.18),
+        (lambda c: c.objects.target_extent_max_m, 0.16),
+    ],
+)
+def test_a_multiple_gives_the_very_float_of_its_metres(
+    read: Callable[[RunConfig], float], metres: float
+) -> None:
+    assert read(RunConfig()) == metres
 
 
 def test_it_labels_a_plane_and_spheres_as_the_small_one_does() -> None:

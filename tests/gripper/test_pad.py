@@ -35,9 +35,9 @@ def test_areas_are_those_of_regular_polygons() -> None:
     "config",
     [
         PadConfig(),
-        PadConfig(radius_step_m=0.0017, rotation_step_rad=0.2),
-        PadConfig(seal_radius_m=0.025),
-        PadConfig(radius_step_m=0.05, rotation_step_rad=math.pi / 2),
+        PadConfig(radius_step_rg=0.068, rotation_step_rad=0.2),
+        PadConfig(seal_radius_rg=1),
+        PadConfig(radius_step_rg=2, rotation_step_rad=math.pi / 2),
     ],
 )
 def test_steps_stay_within_their_bounds_and_edges_are_those_of_the_triangles(

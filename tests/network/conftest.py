@@ -17,4 +17,4 @@ def network() -> GaCnn:
 
 @pytest.fixture(scope="module")
 def data(network: GaCnn) -> bytes:
-    return export_onnx_bytes(network)
+    return export_onnx_bytes(network, cells=24)

@@ -55,7 +55,7 @@ def test_multiply_adds_are_those_of_the_layers_sizes() -> None:
     cells = [144] + [36] * 2 + [9] * 2 + [9] * 2
     blocks = sum(block * n for n in cells) + c * c * (36 + 9)
     head = c * (c // 4) + c // 4
-    assert multiply_adds(network) == stem + blocks + head
+    assert multiply_adds(network, 24) == stem + blocks + head
 
 
 def test_the_cheapest_within_one_standard_error_is_chosen() -> None:

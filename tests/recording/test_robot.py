@@ -105,9 +105,7 @@ def test_the_pad_is_shown_at_its_size(tmp_path: Path) -> None:
     path = tmp_path / "pad.rrd"
     wide = RunConfig.model_validate(
         {
-            "gripper": {"pad": {"radius_m": 0.075, "seal_radius_m": 0.06}},
-            "sensing": {"grid_side_m": 0.18},
-            "evaluate": {"hand": {"stem_radius_m": 0.036}},
+            "gripper": {"pad": {"radius_m": 0.075}},
         }
     )
     with recording(stage_at(path), blueprint()) as stream:

@@ -50,9 +50,7 @@ def made_object(name: str, shape: trimesh.Trimesh, cache: object) -> CatalogueOb
     source = MeshSource(name, name, "none", mesh, "m", "declared")
     value = nsvr(mesh)
     measured = MeasuredObject(source, mesh, (), value, shape_class(value), describe(mesh))
-    config = ObjectsConfig(
-        target_extent_min_m=0.1, target_extent_max_m=0.1, transparent=("glass*",)
-    )
+    config = ObjectsConfig(target_extent_min_rg=4, target_extent_max_rg=4, transparent=("glass*",))
     return finish_object(measured, config, np.random.default_rng(0), cache)  # type: ignore[arg-type]
 
 
@@ -350,7 +348,7 @@ def test_what_stands_above_is_seen_and_what_lies_under_an_edge_is_not_mixed_in(
     height_m = 0.025 * cloud[0, ..., 2][seen[0]]
     assert height_m.max() > 2 * config.grid_depth_m
     assert (height_m > -0.001).all()
-    lower = config.model_copy(update={"grid_height_m": config.grid_depth_m})
+    lower = config.model_copy(update={"grid_height_rg": config.grid_depth_rg})
     blind, _ = sub_clouds(view.depth_m, view.camera, beside, lower, 0.025)
     assert 0.025 * blind[..., 2].max() <= config.grid_depth_m + 1e-6
     # An edge of the cube: with all of their points its cells hang between its top and its foot.
@@ -358,8 +356,8 @@ def test_what_stands_above_is_seen_and_what_lies_under_an_edge_is_not_mixed_in(
     apart, both = (
         sub_clouds(view.depth_m, view.camera, edge, with_layer, 0.025)
         for with_layer in (
-            config.model_copy(update={"grid_depth_m": 0.11}),
-            config.model_copy(update={"grid_depth_m": 0.11, "layer_m": 1.0}),
+            config.model_copy(update={"grid_depth_rg": 4.4}),
+            config.model_copy(update={"grid_depth_rg": 4.4, "layer_rg": 40.0}),
         )
     )
     between = [

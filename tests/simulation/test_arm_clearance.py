@@ -22,7 +22,7 @@ from tests.simulation.kinematics import flange_pose
 
 HAND, ARM, PAD_RADIUS_M = HandConfig(), ArmConfig(), 0.025
 CLEARANCE = ArmClearance(HAND, PAD_RADIUS_M, ARM.base_m[2])
-LONG_HAND = HandConfig(length_m=0.5)  # one that meets its own arm more often
+LONG_HAND = HandConfig(length_rg=20)  # one that meets its own arm more often
 RIGID = [*(shape.link for shape in LINKS), "stem"]  # along the chain
 SLACK_M = 0.005  # PhysX's cylinders are prisms; points are apart
 
@@ -115,7 +115,10 @@ def test_a_pose_of_the_arm_is_judged_in_little_time() -> None:
 
 @pytest.mark.parametrize(
     ("pad_radius_m", "hand"),
-    [(0.025, HAND), (0.075, HandConfig(length_m=0.3, stem_radius_m=0.03, stem_begins_m=0.105))],
+    [
+        (0.025, HAND),
+        (0.075, HandConfig(length_rg=4, stem_radius_rg=0.4, stem_begins_rg=1.4, r_g_m=0.075)),
+    ],
 )
 def test_what_is_nearer_than_the_margin_counts(pad_radius_m: float, hand: HandConfig) -> None:
     """Whatever meets with no margin meets with one."""

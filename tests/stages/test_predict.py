@@ -57,7 +57,7 @@ def frame(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def network(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("network") / "small.onnx"
     config = NetworkConfig(layers=18, channels=(8, 8, 16, 16))
-    path.write_bytes(export_onnx_bytes(lively(build_network(config, seed=0))))
+    path.write_bytes(export_onnx_bytes(lively(build_network(config, seed=0)), cells=24))
     return path
 
 
