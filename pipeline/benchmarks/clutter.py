@@ -1,7 +1,7 @@
 """How fast piles settle: simulated over wall time, bodies added one by one as a run adds them."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -10,6 +10,21 @@ from pipeline.clutter.dropping import pile
 from pipeline.config.scenes import ScenesConfig
 from pipeline.errors import SceneError
 from pipeline.geometry.catalogue import CatalogueObject
+from pipeline.geometry.shape import ShapeClass
+
+PILES = 5
+
+
+def figures(objects: Iterable[CatalogueObject], config: ScenesConfig) -> dict[str, object]:
+    """Times real time at which piles of each class of these objects settle."""
+    every = list(objects)
+    speeds = {
+        str(kind): round(
+            settling_speed([o for o in every if o.shape_class == kind], config, PILES, seed=0), 1
+        )
+        for kind in ShapeClass
+    }
+    return {"settling_times_real_time": speeds}
 
 
 def settling_speed(

@@ -5,6 +5,7 @@ import time
 import numpy as np
 
 from pipeline.benchmarks.clock import quantiles_ms
+from pipeline.benchmarks.inference import sized_network
 from pipeline.config import RunConfig
 from pipeline.control.cloud import DepthPicture, merged_cloud
 from pipeline.control.local_phase import LocalPhase
@@ -17,6 +18,25 @@ from pipeline.simulation.eyes import gripper_from_camera, moved
 from pipeline.world.cameras import camera_at
 from pipeline.world.posed_bodies import PosedBodies
 from pipeline.world.scene import ClutterScene
+
+STEPS = 60
+
+
+def figures(scene: ClutterScene, meshes: dict[str, Mesh], config: RunConfig) -> dict[str, object]:
+    """The closed loop's step with the network at its full size; its weights change no time."""
+    _, network = sized_network(config.network, config.sensing.grid_cells)
+    found = step_ms(scene, meshes, network, config, STEPS)
+    rounded = {
+        part: {name: round(value, 2) for name, value in times.items()}
+        for part, times in found.items()
+    }
+    return {
+        "control_step_p95_ms": rounded["decision"]["p95"],
+        "control_step_ms": rounded["decision"],
+        "control_step_with_picture_ms": rounded["with the picture"],
+        "control_candidates": config.evaluate.policy.local_candidates,
+        "control_layers": config.network.layers,
+    }
 
 
 def step_ms(

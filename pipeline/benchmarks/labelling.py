@@ -1,12 +1,18 @@
 """Grasps a second, by phase and by mesh size: S-1.07 - S-1.12 as production runs them."""
 
+import tempfile
 import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import numpy as np
 import trimesh
 from jaxtyping import Float, Int
 
+from pipeline.artifacts import ArtifactWriter
 from pipeline.benchmarks.clock import Laps, quantiles_ms
+from pipeline.benchmarks.storage import PROVENANCE
+from pipeline.config import RunConfig
 from pipeline.config.grasps import GripperConfig
 from pipeline.geometry.mesh import Mesh
 from pipeline.gripper.batch import BLOCK, assemble_into, empty_batch, label_batch
@@ -16,11 +22,108 @@ from pipeline.gripper.pad import Pad
 from pipeline.gripper.quality import target_wrench
 from pipeline.gripper.solvers.structured import solve_into
 from pipeline.labelling.heights import pad_heights
-from pipeline.labelling.sampling import contact_frames
+from pipeline.labelling.sampling import Candidates, contact_frames
+from pipeline.messages.grasps import GraspOrigin, LabelledGrasps, grasp_batch
+from pipeline.sensing.depth_noise import disturb
+from pipeline.sensing.sub_cloud import sub_clouds
 from pipeline.world.raycasting import RayScene
+from pipeline.world.scene import ClutterScene
+from pipeline.world.view import CameraView
 
 ROUND = 512
+LATENCY_GRASPS = 1000
 _BUMPS = 8
+
+
+Labelled = list[tuple[GraspOrigin, LabelledGrasps]]
+
+
+def end_to_end(
+    scenes: Sequence[ClutterScene], label: Callable[[ClutterScene], Labelled], labelled: int
+) -> dict[str, object]:
+    """Scene to shard on one core: labelled and kept grasps a second, everything included.
+
+    Parameters
+    ----------
+    scenes
+        Labelled one after the other, each written to a shard of its own.
+    label
+        A scene's kept grasps, warm already.
+    labelled
+        Grasps that ``label`` tries on all scenes together.
+    """
+    started, kept = time.perf_counter(), 0
+    with tempfile.TemporaryDirectory() as scratch:
+        for index, scene in enumerate(scenes):
+            kept += write_grasps(Path(scratch) / f"{index}.mcap", label(scene))
+    seconds = time.perf_counter() - started
+    return {
+        "grasps_per_s_per_core": round(labelled / seconds),
+        "kept_grasps_per_s_per_core": round(kept / seconds),
+    }
+
+
+def write_grasps(path: Path, batches: Labelled) -> int:
+    """A shard as stage grasps writes it; how many grasps."""
+    with ArtifactWriter(path, PROVENANCE) as artifact:
+        for origin, grasps in batches:
+            artifact.write("/grasps", grasp_batch(origin, grasps), log_time_ns=0)
+    return sum(len(grasps) for _, grasps in batches)
+
+
+def phases(
+    pad: Pad,
+    config: RunConfig,
+    view: CameraView,
+    rays: RayScene,
+    body_ids: Int[np.ndarray, " bodies"],
+    candidates: Candidates,
+    written: Labelled,
+) -> dict[str, object]:
+    """Microseconds a grasp by phase, and the latency of one grasp alone.
+
+    Parameters
+    ----------
+    pad, config
+        The gripper, and the run.
+    view
+        The picture that sub clouds are cut from.
+    rays, body_ids
+        The scene's true surfaces, and the body id of each of its bodies.
+    candidates
+        What is labelled, phase by phase.
+    written
+        Kept grasps, for the time of writing.
+    """
+    frames = candidates.world_from_contact
+    order = np.argsort(body_ids)
+    body = order[np.searchsorted(body_ids[order], candidates.body_id)]
+    clearance_m = config.grasps.clearance_m
+    seconds = phase_seconds(pad, config.gripper, rays, frames, body, clearance_m)
+    per_grasp = {name: 1e6 * value / len(frames) for name, value in seconds.items()}
+    laps = Laps()
+    measured = disturb(view, np.random.default_rng(0))
+    sub_clouds(measured, view.camera, frames, config.sensing, pad.radius_m)
+    laps.lap("sub cloud")
+    per_grasp["sub cloud"] = 1e6 * laps.seconds["sub cloud"] / len(frames)
+    with tempfile.TemporaryDirectory() as scratch:
+        laps.start()
+        count = write_grasps(Path(scratch) / "x.mcap", written)
+        laps.lap("writing")
+    per_grasp["writing"] = 1e6 * laps.seconds["writing"] / count
+    some = slice(0, LATENCY_GRASPS)
+    return {
+        "us_per_grasp": {name: round(value, 1) for name, value in per_grasp.items()},
+        "latency_ms": latency_ms(pad, config.gripper, rays, frames[some], body[some], clearance_m),
+    }
+
+
+def labelling_rate(label: Callable[[], int], seconds: float) -> float:
+    """Grasps a second of ``label``, which labels some and says how many, over ``seconds``."""
+    started, labelled = time.perf_counter(), 0
+    while time.perf_counter() - started < seconds:
+        labelled += label()
+    return labelled / (time.perf_counter() - started)
 
 
 def phase_seconds(

@@ -5,6 +5,7 @@ from the decoded files. Peers are read as they read fastest, in sequence, and ho
 uncompressed all.
 """
 
+import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -21,6 +22,18 @@ from pipeline.network.samples import GraspTensors, Samples
 SHARDS = 4
 REPEATS, EPOCHS = 5, 30
 PEERS = ("hdf5", "zarr", "webdataset")
+
+
+def figures(samples: Samples) -> dict[str, object]:
+    """Training's loader against raw memory maps and against other formats: rates and ratios."""
+    with tempfile.TemporaryDirectory() as scratch:
+        rates = rates_mb_s(samples, Path(scratch))
+    return {
+        "loader_mb_s": {name: round(rate) for name, rate in rates.items()},
+        "loader_vs_memory_map": round(rates["epoch"] / rates["memory_map"], 2),
+        "loader_vs": {name: round(rates["epoch"] / rates[name], 2) for name in PEERS},
+        "first_pass_vs": {name: round(rates["first_pass"] / rates[name], 2) for name in PEERS},
+    }
 
 
 def rates_mb_s(samples: Samples, folder: Path) -> dict[str, float]:

@@ -1,7 +1,7 @@
 """The quality QP: milliseconds a problem, every solver on the same problems."""
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from pipeline.benchmarks.clock import seconds_of
 from pipeline.config.grasps import GripperConfig, SolverName
@@ -11,6 +11,61 @@ from pipeline.gripper.pad import Pad
 from pipeline.gripper.problem import QualityProblem
 from pipeline.gripper.quality import quality_problem
 from pipeline.gripper.solvers import SOLVERS
+from pipeline.labelling.heights import pad_heights
+from pipeline.labelling.sampling import Candidates
+from pipeline.world.raycasting import RayScene
+
+ROUND = 512
+
+
+PROBLEMS: dict[SolverName, int] = {"structured": 2000, "piqp-sparse": 200, "piqp-dense": 12}
+
+
+def figures(problems: list[QualityProblem]) -> dict[str, object]:
+    """The production solver against PIQP, sparse and dense, on the same problems, shuffled."""
+    shuffled = list(problems)
+    np.random.default_rng(2).shuffle(shuffled)
+    times = milliseconds(shuffled, PROBLEMS)
+    return {
+        "qp_ms": {name: round(value, 4) for name, value in times.items()},
+        "qp_speedup_vs_dense_piqp": round(times["piqp-dense"] / times["structured"], 1),
+        "qp_speedup_vs_sparse_piqp": round(times["piqp-sparse"] / times["structured"], 1),
+    }
+
+
+def problems_under(
+    pad: Pad,
+    config: GripperConfig,
+    rays: RayScene,
+    body_ids: Int[np.ndarray, " bodies"],
+    candidates: Candidates,
+    clearance_m: float,
+) -> list[QualityProblem]:
+    """The QPs of the candidates that touch anything.
+
+    Parameters
+    ----------
+    pad, config
+        The gripper.
+    rays, body_ids
+        The scene's true surfaces, and the body id of each of its bodies.
+    candidates
+        On bodies of that scene.
+    clearance_m
+        Height of the rays' origins above the contact.
+
+    Returns
+    -------
+    A problem a candidate, in their order, less those that touch nothing.
+    """
+    problems: list[QualityProblem] = []
+    for start in range(0, len(candidates), ROUND):
+        rows = slice(start, start + ROUND)
+        frames = candidates.world_from_contact[rows]
+        heights, below = pad_heights(frames, rays, pad, clearance_m)
+        on_target = body_ids[below] == candidates.body_id[rows, None]
+        problems += problems_of(pad, config, heights, on_target)
+    return problems
 
 
 def problems_of(

@@ -4,7 +4,8 @@ Every format holds the same batches of the same tensors, and reading touches eve
 """
 
 import io
-from collections.abc import Callable, Iterator
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import h5py
@@ -14,6 +15,7 @@ import zarr
 
 from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact
 from pipeline.benchmarks.clock import seconds_of
+from pipeline.messages.grasps import LabelledGrasps
 from pipeline.messages.samples import STORED_AS, sample_batch, samples_of
 from pipeline.network.samples import Samples
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
@@ -24,6 +26,26 @@ PROVENANCE = Provenance("bench", "0" * 64, "0" * 64, "0" * 64, 0, (), "bench")
 
 Write = Callable[[Path, list[Samples]], None]
 Read = Callable[[Path], Iterator[dict[str, np.ndarray]]]
+
+
+def figures(samples: Samples) -> dict[str, object]:
+    """MCAP against HDF5, Zarr, WebDataset and NumPy on the same samples: rates and ratios."""
+    with tempfile.TemporaryDirectory() as scratch:
+        rates = against_peers(samples, Path(scratch))
+    peers = [name for name in rates if name != "mcap"]
+    return {
+        "storage": {
+            name: {key: round(value, 1) for key, value in found.items()}
+            for name, found in rates.items()
+        },
+        **{
+            f"mcap_{way}_vs": {
+                peer: round(rates["mcap"][f"{way}_mb_s"] / rates[peer][f"{way}_mb_s"], 2)
+                for peer in peers
+            }
+            for way in ("read", "write")
+        },
+    }
 
 
 def against_peers(samples: Samples, folder: Path) -> dict[str, dict[str, float]]:
@@ -45,6 +67,23 @@ def against_peers(samples: Samples, folder: Path) -> dict[str, dict[str, float]]
             "read_samples_s": len(samples) / reading,
         }
     return figures
+
+
+def samples_of_grasps(grasps: Sequence[LabelledGrasps]) -> Samples:
+    """Labelled grasps as training samples; what storing does not depend on is made up."""
+    cloud = np.concatenate([part.cloud for part in grasps])
+    count = len(cloud)
+    return Samples(
+        cloud=cloud,
+        cloud_mask=np.concatenate([part.cloud_mask for part in grasps]),
+        quality=np.concatenate([part.quality for part in grasps]),
+        object_index=np.zeros(count, dtype=np.int64),
+        shape_class=np.zeros(count, dtype=np.int64),
+        level=np.ones(count, dtype=np.int64),
+        pressure=np.concatenate([part.pressure for part in grasps]),
+        proposal_weight=np.ones(count),
+        pictures=np.ones(count, dtype=np.int64),
+    )
 
 
 def arrays_of(samples: Samples) -> dict[str, np.ndarray]:

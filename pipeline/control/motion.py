@@ -8,7 +8,7 @@ the two, is the velocity. Objects move on the table, so the shift is level.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Integer
 from scipy.ndimage import maximum_filter
 from scipy.signal import correlate
 
@@ -125,7 +125,7 @@ def shift_between(before: HeightMap, after: HeightMap) -> Float[np.ndarray, " 2"
 
 
 def _between_cells(
-    misfit: Float[np.ndarray, "a a"], least: Float[np.ndarray, " 2"]
+    misfit: Float[np.ndarray, "a a"], least: Integer[np.ndarray, " 2"]
 ) -> Float[np.ndarray, " 2"]:
     """Where the parabola through the least value and its two neighbours is least, by axis."""
     found = np.zeros(2)
