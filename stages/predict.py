@@ -102,9 +102,7 @@ def predict(
         frames = [within_workspace(frame, workspace) for frame in frames]
     source = quality_source(network, config.gripper, THREADS)
     radius_m = config.gripper.pad.radius_m
-    ranking = NetworkRanking(
-        source.predict, config.sensing, radius_m, config.evaluate.policy.smoothing_m
-    )
+    ranking = NetworkRanking(source.predict, config.sensing, radius_m, config.evaluate.policy)
     proposals = propose_grasps(
         frames, ranking, config, generator(config.seed, "predict", frames[0].name)
     )

@@ -55,10 +55,12 @@ def step_ms(
         network.predict,
         config.sensing,
         config.gripper.pad.radius_m,
-        config.evaluate.policy.smoothing_m,
+        config.evaluate.policy,
     )
     view = scene.views[0]
-    aims = merged_cloud([DepthPicture(view.depth_m, view.camera)]).points_m
+    policy = config.evaluate.policy
+    picture = DepthPicture(view.depth_m, view.camera)
+    aims = merged_cloud([picture], policy.voxel_m, policy.above_table_m).points_m
     on_wrist = camera_at("wrist", config.cameras.wrist, np.zeros(3), 1.0, 0.0, 0.0)
     step_m = config.evaluate.policy.speed_m_s / config.evaluate.policy.rate_hz
     seen: list[float] = []

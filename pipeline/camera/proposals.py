@@ -93,7 +93,8 @@ def propose_grasps(
         DepthPicture(np.where(_graspable(frame, support, config), frame.depth_m, 0.0), frame.camera)
         for frame in moved
     ]
-    cloud = merged_cloud(graspable)
+    policy = config.evaluate.policy
+    cloud = merged_cloud(graspable, policy.voxel_m, 0.0)
     if len(cloud) == 0:
         raise PictureError(
             f"{frames[0].name}: nothing stands out of the support where grasps are allowed",
@@ -228,7 +229,8 @@ def _candidates(
     )
     left_out: Counter[str] = Counter()
     left_out["too steep, or too small a surface"] = settings.candidates - len(found)
-    obstacles = merged_cloud(pictures)
+    policy = config.evaluate.policy
+    obstacles = merged_cloud(pictures, policy.voxel_m, policy.above_table_m)
     free = free_of_collision(found.world_from_contact, obstacles.points_m, hand)
     left_out["hand or stem would meet something"] = int((~free).sum())
     if support is not None:

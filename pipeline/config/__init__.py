@@ -9,13 +9,13 @@ from pipeline.config.cameras import (
 from pipeline.config.evaluation import (
     EvaluateConfig,
     LiftConfig,
-    PolicyConfig,
     RecordingConfig,
     SuctionConfig,
 )
 from pipeline.config.grasps import GraspsConfig, GripperConfig, PadConfig, SensingConfig
 from pipeline.config.learning import NetworkConfig, ShardsConfig, SweepConfig, TrainConfig
 from pipeline.config.objects import ConvexPartsConfig, ObjectsConfig, SplitConfig
+from pipeline.config.policy import PolicyConfig
 from pipeline.config.referee import RefereeConfig
 from pipeline.config.scenes import ClutterCounts, ScenesConfig
 from pipeline.config.tree import RunConfig, load_run_config, section_digest

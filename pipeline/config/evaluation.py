@@ -1,10 +1,10 @@
 """[evaluate] and [recording]: the closed loop, and what recordings show."""
 
-import math
 from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
+from pipeline.config.policy import PolicyConfig
 from pipeline.config.section import LengthInMetres, ScaledSection, Section
 
 RobotName = Literal["floating", "iiwa14"]
@@ -41,6 +41,7 @@ class HandConfig(ScaledSection):
     camera_aside_m: ClassVar[LengthInMetres] = LengthInMetres()
     camera_above_m: ClassVar[LengthInMetres] = LengthInMetres()
     camera_focus_m: ClassVar[LengthInMetres] = LengthInMetres()
+    margin_m: ClassVar[LengthInMetres] = LengthInMetres()
 
     length_rg: float = Field(8.0, gt=2.0, le=40.0, description="pad to flange [r_G]")
     stem_radius_rg: float = Field(
@@ -55,6 +56,9 @@ class HandConfig(ScaledSection):
     camera_above_rg: float = Field(7.2, gt=0, le=20.0, description="camera above the pad [r_G]")
     camera_focus_rg: float = Field(
         6.0, gt=0, le=80.0, description="where its axis meets the gripper's, below the pad [r_G]"
+    )
+    margin_rg: float = Field(
+        0.16, ge=0, description="hand and stem keep this far from what was measured [r_G]"
     )
     camera_radius_m: float = Field(
         0.031,
@@ -78,108 +82,6 @@ class ArmConfig(Section):
     )
     home_m: tuple[float, float, float] = Field(
         (-0.15, 0.0, 0.45), description="where the pad waits, pointing down [m]"
-    )
-
-
-class PolicyConfig(ScaledSection):
-    """Candidates and the closed loop; Supplement VI."""
-
-    wrist_view_m: ClassVar[LengthInMetres] = LengthInMetres()
-    standoff_m: ClassVar[LengthInMetres] = LengthInMetres()
-    correction_radius_m: ClassVar[LengthInMetres] = LengthInMetres()
-    commit_m: ClassVar[LengthInMetres] = LengthInMetres()
-    look_m: ClassVar[LengthInMetres] = LengthInMetres()
-    another_m: ClassVar[LengthInMetres] = LengthInMetres()
-    regrasp_lever_m: ClassVar[LengthInMetres] = LengthInMetres()
-    regrasp_radius_m: ClassVar[LengthInMetres] = LengthInMetres()
-    smoothing_m: ClassVar[LengthInMetres] = LengthInMetres()
-    avoid_radius_m: ClassVar[LengthInMetres] = LengthInMetres()
-    slip_m: ClassVar[LengthInMetres] = LengthInMetres()
-
-    candidates: int = Field(128, ge=1, le=4096, description="u, sub clouds of the global phase")
-    local_candidates: int = Field(48, ge=1, le=4096, description="u of each step on the way down")
-    wrist_views: int = Field(
-        2,
-        ge=0,
-        le=8,
-        description="looks of the wrist before the choice; at what depth misses, two for one",
-    )
-    wrist_view_rg: float = Field(
-        11.2, gt=2.0, le=80.0, description="pad above what it looks at [r_G]"
-    )
-    tilt_max_rad: float = Field(
-        math.radians(50), ge=0, lt=math.pi / 2, description="approach off the vertical [rad]"
-    )
-    rate_hz: float = Field(15.0, gt=0, description="closed-loop rate; Supplement VI: 15 [Hz]")
-    approach_max_s: float = Field(
-        10.0, gt=0.5, le=120, description="longest way down, corrections and all [s]"
-    )
-    standoff_rg: float = Field(8.0, gt=0.8, le=40.0, description="where the approach begins [r_G]")
-    correction_radius_rg: float = Field(
-        0.6, ge=0, description="how far one correction may move the contact [r_G]"
-    )
-    correction_tilt_rad: float = Field(
-        0.3, gt=0, le=math.pi, description="how far one correction may turn the approach [rad]"
-    )
-    commit_rg: float = Field(
-        1.2, ge=0, description="this near to the contact nothing is corrected any more [r_G]"
-    )
-    look_rg: float = Field(
-        2.4,
-        gt=0,
-        description="radius looked at around the aim: the pad and a correction [r_G]",
-    )
-    another_rg: float = Field(
-        1.2,
-        ge=0,
-        description="another place is at least so far from each given up in the attempt [r_G]",
-    )
-    retargets: int = Field(
-        3, ge=0, description="how often another candidate may be taken after a closer look"
-    )
-    retarget_gain: float = Field(
-        0.1, ge=0, le=1, description="what q-hat another must promise more for that [1]"
-    )
-    correction_gain: float = Field(
-        0.1, ge=0, le=1, description="rise of q-hat that a correction must promise [1]"
-    )
-    regrasps: int = Field(
-        2, ge=0, description="how often an attempt grasps elsewhere what did not hold in the tug"
-    )
-    regrasp_quality: float = Field(
-        0.0, ge=0, le=1, description="least q-hat of another place after a seal that failed [1]"
-    )
-    regrasp_lever_rg: float = Field(
-        0.6, ge=0, description="lever felt in the tug from which the centre is aimed at [r_G]"
-    )
-    regrasp_radius_rg: float = Field(
-        1.0, gt=0, description="how near to the load's centre a regrasp is sought [r_G]"
-    )
-    new_choices: int = Field(
-        2, ge=0, description="how often all is chosen anew where nothing is left near the aim"
-    )
-    smoothing_rg: float = Field(
-        0.28, ge=0, description="q-hat is averaged over neighbours this near [r_G]"
-    )
-    avoid_radius_rg: float = Field(
-        0.8,
-        ge=0,
-        description="no second try this near to a failed one while there is another [r_G]",
-    )
-    travel_m_s: float = Field(0.8, gt=0, le=3, description="speed in free space [m/s]")
-    speed_m_s: float = Field(0.25, gt=0, le=2, description="speed of approach and lift [m/s]")
-    acceleration_m_s2: float = Field(3.0, gt=0, le=50, description="of every motion [m/s2]")
-    force_limit_n: float = Field(
-        15.0, gt=0, description="contact force that stops the approach [N]"
-    )
-    tension_min_n: float = Field(
-        0.003, gt=0, description="least pull on the base that tells a held object: 0.3 g [N]"
-    )
-    slip_rg: float = Field(
-        0.32, gt=0, description="shift of the load's line in one step that is a slip [r_G]"
-    )
-    trim_max_rad: float = Field(
-        math.radians(12), ge=0, lt=1, description="most the lift may tilt to lessen moments [rad]"
     )
 
 

@@ -49,6 +49,9 @@ SCALED = (
     ("evaluate", "lift"),
     ("evaluate", "hand"),
     ("evaluate", "policy"),
+    ("evaluate", "policy", "motion"),
+    ("evaluate", "policy", "unseen"),
+    ("evaluate", "policy", "picker"),
 )
 
 

@@ -6,8 +6,6 @@ from jaxtyping import Bool, Float
 
 from pipeline.config.evaluation import HandConfig
 
-_MARGIN_M = 0.004
-
 
 def free_of_collision(
     world_from_gripper: Float[np.ndarray, "k 4 4"],
@@ -22,8 +20,8 @@ def free_of_collision(
         _free(
             np.ascontiguousarray(world_from_gripper),
             np.ascontiguousarray(points_m),
-            hand.stem_radius_m + _MARGIN_M,
-            hand.stem_begins_m - _MARGIN_M,
+            hand.stem_radius_m + hand.margin_m,
+            hand.stem_begins_m - hand.margin_m,
         )
     )
 

@@ -14,8 +14,6 @@ from jaxtyping import Bool, Float, Integer
 
 from pipeline.world.cameras import PinholeCamera
 
-TABLE_CLEARANCE_M = 0.006  # measured points lower than this may be the table
-VOXEL_M = 0.003
 _CUBES_A_SIDE = 1 << 20  # cubes are numbered within ± 1.5 km
 
 
@@ -48,9 +46,19 @@ class Cloud:
         return Cloud(self.points_m[chosen], self.eye_m[chosen])
 
 
-def merged_cloud(pictures: Sequence[DepthPicture], voxel_m: float = VOXEL_M) -> Cloud:
-    """The objects' points of all pictures, one a cube; without the table's."""
-    parts = [_measured(picture) for picture in pictures]
+def merged_cloud(pictures: Sequence[DepthPicture], voxel_m: float, above_table_m: float) -> Cloud:
+    """The objects' points of all pictures, one a cube; without the table's.
+
+    Parameters
+    ----------
+    pictures
+        Depth images of one scene.
+    voxel_m
+        Side of a cube of the world whose points become their mean [m].
+    above_table_m
+        Points lower than this over z = 0 may be the table and are left out [m].
+    """
+    parts = [_measured(picture, above_table_m) for picture in pictures]
     points = np.concatenate([part.points_m for part in parts])
     eyes = np.concatenate([part.eye_m for part in parts])
     if len(points) == 0:
@@ -65,10 +73,10 @@ def merged_cloud(pictures: Sequence[DepthPicture], voxel_m: float = VOXEL_M) -> 
     return Cloud(means, eyes[first])
 
 
-def _measured(picture: DepthPicture) -> Cloud:
+def _measured(picture: DepthPicture, lowest_m: float) -> Cloud:
     camera = picture.camera
     depth = np.ascontiguousarray(picture.depth_m, dtype=np.float64)
-    points = _points(depth, camera.intrinsics, camera.world_from_camera, TABLE_CLEARANCE_M)
+    points = _points(depth, camera.intrinsics, camera.world_from_camera, lowest_m)
     return Cloud(points, np.broadcast_to(camera.world_from_camera[:3, 3], points.shape))
 
 

@@ -9,8 +9,6 @@ from pipeline.control.clearance import free_of_collision
 from pipeline.control.cloud import DepthPicture, merged_cloud
 from pipeline.control.ranking import Ranking
 
-_VOXEL_M = 0.002
-
 
 def corrected(
     picture: DepthPicture,
@@ -26,7 +24,7 @@ def corrected(
     ``correction_gain``, so that noise does not move the gripper to and fro.
     """
     policy = config.policy
-    cloud = merged_cloud([picture], _VOXEL_M)
+    cloud = merged_cloud([picture], policy.correction_voxel_m, policy.above_table_m)
     near = sample_near(
         cloud,
         aim[:3, 3],

@@ -77,7 +77,7 @@ class GlobalPhase:
             if isinstance(more, Cause):
                 return more
             pictures = [*pictures, *more]
-        cloud, unseen = merged_cloud(pictures), unseen_contacts(pictures)
+        cloud, unseen = self._cloud(pictures), self._unseen(pictures)
         if len(cloud) == 0 and len(unseen) == 0:
             return Cause.EMPTY_CLOUD
         decision.pictures = pictures
@@ -116,15 +116,15 @@ class GlobalPhase:
 
         lever_m : horizontal lever of the contact that did not hold.
         """
-        cloud = merged_cloud(pictures)
-        top = top_of_column_m(cloud, place_m)
+        cloud = self._cloud(pictures)
+        top = top_of_column_m(cloud, place_m, self._policy.regrasp_column_m)
         if top is None:
             return None
         found = self._unspoilt(self._sampled_near(cloud, top))
         if len(found) == 0:
             return None
         quality = self._ranking(pictures, found)
-        worth = worth_with_lever(quality, found, place_m, lever_m, self._policy.regrasp_radius_m)
+        worth = worth_with_lever(quality, found, place_m, lever_m, self._policy)
         nearer = worth > 0.0
         ranked = self._free(cloud, found.take(nearer), quality[nearer], best_first=worth[nearer])
         return self._first_of(ranked, least=0.0)
@@ -137,13 +137,14 @@ class GlobalPhase:
         For what depth does not show a look that is left becomes two, from opposite sides: the
         outlines lean over it alike, and its middle is between.
         """
-        found = self._unspoilt(self._sampled(merged_cloud(pictures)))
+        found = self._unspoilt(self._sampled(self._cloud(pictures)))
         quality = self._ranking(pictures, found) if len(found) else np.empty(0)
         places = found.world_from_contact[:, :3, 3]
         wanted = self._policy.wrist_views
+        apart = best_apart(places, quality, wanted, self._policy.look_apart_m)
         here = self._robot.pose()
-        looks = [(place, here) for place in best_apart(places, quality, wanted)]
-        for contact in unseen_contacts(pictures)[: wanted - len(looks)]:
+        looks = [(place, here) for place in apart]
+        for contact in self._unseen(pictures)[: wanted - len(looks)]:
             looks += [(contact[:3, 3], here), (contact[:3, 3], turned_about(here))]
         more = []
         for place, heading in looks:
@@ -189,6 +190,12 @@ class GlobalPhase:
         free = free_of_collision(poses, cloud.points_m, self._config.hand)
         order = np.argsort(~self._fresh(poses[:, :3, 3]), kind="stable")
         return [Choice(poses[i], 0.0, felt_for=True) for i in order if free[i]]
+
+    def _cloud(self, pictures: Sequence[DepthPicture]) -> Cloud:
+        return merged_cloud(pictures, self._policy.voxel_m, self._policy.above_table_m)
+
+    def _unseen(self, pictures: Sequence[DepthPicture]) -> list[Pose]:
+        return unseen_contacts(pictures, self._policy.unseen, self._policy.above_table_m)
 
     def _sampled(self, cloud: Cloud) -> Candidates:
         return sample_candidates(

@@ -13,8 +13,6 @@ from pipeline.control.correction import corrected
 from pipeline.control.motion import Motion
 from pipeline.control.ranking import Ranking
 
-_SHOWN = 0.9  # of the radius looked at, what a picture is sure to show
-
 Pose = Float[np.ndarray, "4 4"]
 
 
@@ -36,8 +34,9 @@ class LocalPhase:
 
     def start_over(self) -> None:
         """Another place is aimed at: how the last one moved says nothing of it."""
+        policy = self._config.policy
         self._motion = Motion(
-            1.0 / self._config.policy.rate_hz, _SHOWN * self._config.policy.look_m
+            1.0 / policy.rate_hz, policy.shown_share * policy.look_m, policy.motion
         )
 
     @property
@@ -47,7 +46,9 @@ class LocalPhase:
 
     def look(self, picture: DepthPicture, aim: Pose) -> tuple[Pose, float] | None:
         """The pose to aim at now and its q-hat; None where there is nothing to go by."""
-        self._motion.see(merged_cloud([picture]).points_m, aim[:3, 3])
+        policy = self._config.policy
+        cloud = merged_cloud([picture], policy.voxel_m, policy.above_table_m)
+        self._motion.see(cloud.points_m, aim[:3, 3])
         return corrected(
             picture,
             aim,

@@ -12,23 +12,28 @@ from jaxtyping import Float, Integer
 from scipy.ndimage import maximum_filter
 from scipy.signal import correlate
 
-_CELL_M = 0.002
-_REACH_CELLS = 20  # shifts up to 40 mm
-_REFRESH_CELLS = 12  # after this shift the earlier picture is replaced
-_LEAST_OVERLAP = 0.4
-# A shift is known to about a cell's half; less than this in the time between is standing still.
-_STILL_M = 0.002
-# What a shift must explain of the earlier heights, squared: on an even surface any fits as well.
-_EXPLAINED = 0.03
+from pipeline.config.policy import MotionConfig
 
 
 class Motion:
     """Velocity of what lies around the aim, picture by picture, one control period apart."""
 
-    def __init__(self, period_s: float, seen_m: float) -> None:
-        """seen_m : how far around the aim, level, a picture shows all there is."""
+    def __init__(self, period_s: float, seen_m: float, config: MotionConfig) -> None:
+        """Nothing has been seen yet.
+
+        Parameters
+        ----------
+        period_s
+            Time between two control steps [s].
+        seen_m
+            How far around the aim, level, a picture shows all there is [m].
+        config
+            Cells and thresholds.
+        """
         self._period_s = period_s
-        self._seen_cells = int(seen_m / _CELL_M)
+        self._config = config
+        self._cell_m = config.cell_m
+        self._seen_cells = int(seen_m / config.cell_m)
         self._before: HeightMap | None = None
         self._middle_m = np.zeros(2)
         self._periods = 0
@@ -45,12 +50,12 @@ class Motion:
         if self._before is None or self._periods == 0:
             self._begin(points_m, aim_m)
             return
-        after = self._map(points_m, aim_m, self._seen_cells + _REACH_CELLS)
-        shift_m = _CELL_M * shift_between(self._before, after)
+        after = self._map(points_m, aim_m, self._seen_cells + self._config.reach_cells)
+        shift_m = self._cell_m * shift_between(self._before, after, self._config)
         size = float(np.linalg.norm(shift_m))
         time_s = self._periods * self._period_s
-        self.velocity_m_s[:2] = shift_m / time_s if size > _STILL_M else 0.0
-        if size > _REFRESH_CELLS * _CELL_M:
+        self.velocity_m_s[:2] = shift_m / time_s if size > self._config.still_m else 0.0
+        if size > self._config.refresh_cells * self._cell_m:
             self._begin(points_m, aim_m)
 
     def _begin(self, points_m: Float[np.ndarray, "n 3"], aim_m: Float[np.ndarray, " 3"]) -> None:
@@ -60,9 +65,9 @@ class Motion:
     def _map(
         self, points_m: Float[np.ndarray, "n 3"], aim_m: Float[np.ndarray, " 3"], half_cells: int
     ) -> "HeightMap":
-        aside = (aim_m[:2] - self._middle_m) / _CELL_M
+        aside = (aim_m[:2] - self._middle_m) / self._cell_m
         return height_map(
-            (points_m - [*self._middle_m, 0.0]) / [_CELL_M, _CELL_M, 1.0],
+            (points_m - [*self._middle_m, 0.0]) / [self._cell_m, self._cell_m, 1.0],
             aside,
             self._seen_cells,
             half_cells,
@@ -99,7 +104,9 @@ def height_map(
     return HeightMap(heights * seen, seen)
 
 
-def shift_between(before: HeightMap, after: HeightMap) -> Float[np.ndarray, " 2"]:
+def shift_between(
+    before: HeightMap, after: HeightMap, config: MotionConfig
+) -> Float[np.ndarray, " 2"]:
     """By how many cells the heights have moved, to a fraction of one; 0 where none fits better.
 
     after : the same place in a larger square; what it is larger by bounds the shift.
@@ -114,12 +121,12 @@ def shift_between(before: HeightMap, after: HeightMap) -> Float[np.ndarray, " 2"
         - 2.0 * correlated(after.height_m, before.height_m)
         + correlated(after.height_m**2, before.seen)
     )
-    enough = both >= _LEAST_OVERLAP * before.seen.sum()
+    enough = both >= config.overlap_min * before.seen.sum()
     misfit = np.where(enough, squares / np.maximum(both, 1.0), np.inf)
     least = np.array(np.unravel_index(np.argmin(misfit), misfit.shape))
     middle = np.array(misfit.shape) // 2
     explained = misfit[tuple(middle)] - misfit[tuple(least)]
-    if not explained >= _EXPLAINED * np.sum(before.height_m**2) / before.seen.sum():
+    if not explained >= config.explained_min * np.sum(before.height_m**2) / before.seen.sum():
         return np.zeros(2)
     return np.asarray(least - middle + _between_cells(misfit, least))
 

@@ -24,11 +24,6 @@ from pipeline.control.robot import Eyes, Reading, Robot, State
 from pipeline.control.viewpoints import backed_off, facing
 from pipeline.control.wrench_monitor import Event, WrenchMonitor, hanging_n, trimmed
 
-_SEARCH_M = 0.06  # past the expected contact the pad goes on at most this far
-_RETREAT_M = 0.05
-_TUG_M = 0.01  # the first bit of the lift, in which a seal shows its pull
-_TRIM_FROM_M = 0.03  # clear of the neighbours
-
 Phase = tuple[State, Callable[[], Cause | None]]
 
 
@@ -133,7 +128,7 @@ class Attempt:
             self.decision.world_from_contact = self._local.passed_on(aim)
             event = self._monitor.moving(reading)
             if event is Event.COLLISION:
-                self._travel(backed_off(self._robot.pose(), _RETREAT_M))
+                self._travel(backed_off(self._robot.pose(), self._policy.retreat_m))
                 return Cause.COLLISION
             if event is Event.BLOCKED:
                 return Cause.UNREACHABLE
@@ -141,14 +136,14 @@ class Attempt:
                 return None
             if reading.arrived:
                 break
-        self._travel(backed_off(self._robot.pose(), _RETREAT_M + self._search_m()))
+        self._travel(backed_off(self._robot.pose(), self._policy.retreat_m + self._search_m()))
         return Cause.NO_CONTACT
 
     def _search_m(self) -> float:
         """How far past the expected contact the pad goes on; feeling for it, down to the table."""
         if not self._felt_for:
-            return _SEARCH_M
-        return _SEARCH_M + float(self.decision.world_from_contact[2, 3])
+            return self._policy.search_m
+        return self._policy.search_m + float(self.decision.world_from_contact[2, 3])
 
     def _sees(self, aim: Float[np.ndarray, "4 4"], here: Float[np.ndarray, "4 4"]) -> bool:
         """Whether the aim is not too near: for the wrist's camera, or to go elsewhere."""
@@ -191,11 +186,11 @@ class Attempt:
         """
         self._robot.vacuum(on=True)
         start = self._robot.pose()
-        readings = self._raise(start, _TUG_M)
+        readings = self._raise(start, self._policy.tug_m)
         if self._monitor.holds(readings[-1]):
             return None
         self._robot.vacuum(on=False)
-        self._travel(backed_off(start, _RETREAT_M))
+        self._travel(backed_off(start, self._policy.retreat_m))
         self.decision.spoilt_m.append(self.decision.world_from_contact[:3, 3])
         if self._regrasps_left == 0:
             return Cause.NO_SEAL
@@ -232,8 +227,8 @@ class Attempt:
         while True:
             target = self._robot.pose()
             risen = target[2, 3] - start[2, 3]
-            if reading is not None and left > 0 and risen >= _TRIM_FROM_M:
-                target, turned = trimmed(target, reading.wrench, left)
+            if reading is not None and left > 0 and risen >= self._policy.trim_from_m:
+                target, turned = trimmed(target, reading.wrench, left, self._policy)
                 left -= turned
             target[:2, 3], target[2, 3] = start[:2, 3], start[2, 3] + height
             reading = self._robot.step(target, speed)

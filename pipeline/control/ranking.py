@@ -7,11 +7,10 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from pipeline.config.grasps import SensingConfig
+from pipeline.config.policy import PickerConfig, PolicyConfig
 from pipeline.control.candidates import Candidates
 from pipeline.control.cloud import DepthPicture
 from pipeline.sensing.sub_cloud import merged_sub_clouds
-
-_LIKE_COSINE = 0.95  # approaches within 18 degrees
 
 Predict = Callable[
     [Float[np.ndarray, "n g g 3"], Bool[np.ndarray, "n g g"]], Float[np.ndarray, " n"]
@@ -35,12 +34,12 @@ class NetworkRanking:
     """
 
     def __init__(
-        self, predict: Predict, sensing: SensingConfig, radius_m: float, smoothing_m: float
+        self, predict: Predict, sensing: SensingConfig, radius_m: float, policy: PolicyConfig
     ) -> None:
         self._predict = predict
         self._sensing = sensing
         self._radius_m = radius_m
-        self._smoothing_m = smoothing_m
+        self._policy = policy
 
     def __call__(
         self, pictures: Sequence[DepthPicture], candidates: Candidates, /
@@ -51,11 +50,16 @@ class NetworkRanking:
             views, candidates.world_from_contact, self._sensing, self._radius_m
         )
         quality = np.asarray(self._predict(cloud, seen), dtype=np.float64)
-        return smoothed(candidates, quality, self._smoothing_m)
+        return smoothed(
+            candidates, quality, self._policy.smoothing_m, self._policy.smoothing_tilt_rad
+        )
 
 
 def smoothed(
-    candidates: Candidates, quality: Float[np.ndarray, " k"], within_m: float
+    candidates: Candidates,
+    quality: Float[np.ndarray, " k"],
+    within_m: float,
+    within_rad: float,
 ) -> Float[np.ndarray, " k"]:
     """Mean over neighbours, weighted by exp(-(distance / within)^2); like approaches alone."""
     if within_m == 0.0 or len(quality) == 0:
@@ -63,23 +67,28 @@ def smoothed(
     place = candidates.world_from_contact[:, :3, 3]
     approach = candidates.world_from_contact[:, :3, 2]
     distance = np.linalg.norm(place[:, None] - place[None], axis=2)
-    weight = np.exp(-((distance / within_m) ** 2)) * (approach @ approach.T > _LIKE_COSINE)
+    weight = np.exp(-((distance / within_m) ** 2)) * (approach @ approach.T > np.cos(within_rad))
     return np.asarray((weight @ quality) / weight.sum(axis=1))
 
 
-HIGHEST_BAND_M = 0.015
-_ROUGH_M = 0.001
-
-
-def flattest_at_the_top(
-    pictures: Sequence[DepthPicture], candidates: Candidates, /
-) -> Float[np.ndarray, " k"]:
+class GeometricRanking:
     """The geometric picker: the flattest patch among those at the highest point.
 
-    exp(-roughness over 1 mm) for candidates within 15 mm of the highest one, less than any of
-    these for all others, the higher the better.
+    exp(-roughness over `roughness_m`) for candidates within `band_m` of the highest one, less than
+    any of these for all others, the higher the better.
     """
-    height = candidates.world_from_contact[:, 2, 3]
-    below = height.max() - height
-    flatness = np.exp(-candidates.roughness_m / _ROUGH_M)
-    return np.where(below <= HIGHEST_BAND_M, 0.5 + 0.5 * flatness, 0.5 * np.exp(-below / 0.1))
+
+    def __init__(self, config: PickerConfig) -> None:
+        self._config = config
+
+    def __call__(
+        self, pictures: Sequence[DepthPicture], candidates: Candidates, /
+    ) -> Float[np.ndarray, " k"]:
+        """A value in [0, 1] for every candidate; pictures are not looked at."""
+        height = candidates.world_from_contact[:, 2, 3]
+        below = height.max() - height
+        flatness = np.exp(-candidates.roughness_m / self._config.roughness_m)
+        at_the_top = below <= self._config.band_m
+        return np.where(
+            at_the_top, 0.5 + 0.5 * flatness, 0.5 * np.exp(-below / self._config.fall_m)
+        )

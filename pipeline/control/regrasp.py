@@ -8,13 +8,11 @@ no picture shows; a first tug does.
 import numpy as np
 from jaxtyping import Float
 
+from pipeline.config.policy import PolicyConfig
 from pipeline.control.candidates import Candidates
 from pipeline.control.cloud import Cloud
 from pipeline.control.robot import Reading
 from pipeline.control.wrench_monitor import line_of_load
-
-_COLUMN_M = 0.02  # what is this near to a vertical line is on it
-_NEARER = 0.7  # a new contact has at most this share of the old lever
 
 
 def hangs_below_m(felt: Reading, base_above_pad_m: float) -> Float[np.ndarray, " 2"]:
@@ -31,10 +29,10 @@ def hangs_below_m(felt: Reading, base_above_pad_m: float) -> Float[np.ndarray, "
 
 
 def top_of_column_m(
-    cloud: Cloud, place_m: Float[np.ndarray, " 2"]
+    cloud: Cloud, place_m: Float[np.ndarray, " 2"], radius_m: float
 ) -> Float[np.ndarray, " 3"] | None:
-    """The highest point measured over a place on the table; None where there is none."""
-    near = np.linalg.norm(cloud.points_m[:, :2] - place_m, axis=1) <= _COLUMN_M
+    """The highest point measured within a radius of a vertical line; None where there is none."""
+    near = np.linalg.norm(cloud.points_m[:, :2] - place_m, axis=1) <= radius_m
     if not near.any():
         return None
     column = cloud.points_m[near]
@@ -46,12 +44,24 @@ def worth_with_lever(
     candidates: Candidates,
     place_m: Float[np.ndarray, " 2"],
     lever_m: float,
-    radius_m: float,
+    config: PolicyConfig,
 ) -> Float[np.ndarray, " k"]:
     """q-hat, less the farther the contact is from where the load hangs; 0 where that gains little.
 
-    lever_m : horizontal lever of the contact that did not hold. radius_m : r_G; the moment that a
-    pad bears grows with it.
+    Parameters
+    ----------
+    quality
+        q-hat of each candidate, shape (k,).
+    candidates
+        Contacts to choose among.
+    place_m
+        Where the load hangs, horizontally in WCS [m].
+    lever_m
+        Horizontal lever of the contact that did not hold [m].
+    config
+        How much nearer a new contact must be, and the radius over which worth falls: the moment
+        that a pad bears grows with its radius.
     """
     aside = np.linalg.norm(candidates.world_from_contact[:, :2, 3] - place_m, axis=1)
-    return np.where(aside <= _NEARER * lever_m, quality * np.exp(-((aside / radius_m) ** 2)), 0.0)
+    fall = np.exp(-((aside / config.regrasp_radius_m) ** 2))
+    return np.where(aside <= config.regrasp_nearer * lever_m, quality * fall, 0.0)

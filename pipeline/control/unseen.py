@@ -13,47 +13,51 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Bool, Float, Integer
 
-from pipeline.control.cloud import TABLE_CLEARANCE_M, DepthPicture
+from pipeline.config.policy import UnseenConfig
+from pipeline.control.cloud import DepthPicture
 from pipeline.geometry.transforms import invert, transform_points
 from pipeline.world.cameras import pixel_rays, points_of_depth
 
 TABLE = 0  # instance of the table and of nothing
-_FEWEST_PIXELS = 30  # fewer say too little of an outline
-_MEASURED = 0.2  # an object is seen where this share of its pixels lies above the table
-_CELL_M = 0.004
-_HIGHEST_M = 0.15
-_AROUND_M = 0.06  # the hull may lean this far over what the outline covers of the table
-_WIDEST_M = 1.0  # what an outline covers of the table, seen nearly level, is without bounds
 
 
-def unseen_contacts(pictures: Sequence[DepthPicture]) -> list[Float[np.ndarray, "4 4"]]:
+def unseen_contacts(
+    pictures: Sequence[DepthPicture], config: UnseenConfig, above_table_m: float
+) -> list[Float[np.ndarray, "4 4"]]:
     """A level contact on top of each object that depth does not show; world_from_contact.
 
     An object's pixels are counted over all pictures; those without instances tell nothing.
     """
     segmented = [picture for picture in pictures if picture.instances is not None]
-    found = (hull_top(segmented, name) for name in unseen_instances(segmented))
+    unseen = unseen_instances(segmented, config, above_table_m)
+    found = (hull_top(segmented, name, config) for name in unseen)
     return [contact for contact in found if contact is not None]
 
 
-def unseen_instances(pictures: Sequence[DepthPicture]) -> list[int]:
+def unseen_instances(
+    pictures: Sequence[DepthPicture], config: UnseenConfig, above_table_m: float
+) -> list[int]:
     """Instances of whose pixels, over all pictures, too few were measured above the table."""
     shown: Counter[int] = Counter()
     above: Counter[int] = Counter()
     for picture in pictures:
         instances = _instances(picture)
         points, rows, columns = points_of_depth(picture.depth_m, picture.camera, every=1)
-        high = points[:, 2] > TABLE_CLEARANCE_M
+        high = points[:, 2] > above_table_m
         shown.update(instances.ravel().tolist())
         above.update(instances[rows[high], columns[high]].tolist())
     return [
         name
         for name, count in sorted(shown.items())
-        if name != TABLE and count >= _FEWEST_PIXELS and above[name] < _MEASURED * count
+        if name != TABLE
+        and count >= config.fewest_pixels
+        and above[name] < config.measured_share * count
     ]
 
 
-def hull_top(pictures: Sequence[DepthPicture], name: int) -> Float[np.ndarray, "4 4"] | None:
+def hull_top(
+    pictures: Sequence[DepthPicture], name: int, config: UnseenConfig
+) -> Float[np.ndarray, "4 4"] | None:
     """The contact, level, over the middle of an instance's visual hull; None where there is none.
 
     A picture that was cut off short of a place, or shows something before it, says nothing of it.
@@ -62,7 +66,7 @@ def hull_top(pictures: Sequence[DepthPicture], name: int) -> Float[np.ndarray, "
     outlines = [(picture, mask) for picture, mask in outlines if mask.any()]
     if not outlines:
         return None
-    places = _places(*outlines[0])
+    places = _places(*outlines[0], config)
     within = np.ones(len(places), dtype=bool)
     for picture, mask in outlines:
         within &= _within(picture, mask, places)
@@ -74,7 +78,9 @@ def hull_top(pictures: Sequence[DepthPicture], name: int) -> Float[np.ndarray, "
     return contact
 
 
-def _places(picture: DepthPicture, mask: Bool[np.ndarray, "h w"]) -> Float[np.ndarray, "n 3"]:
+def _places(
+    picture: DepthPicture, mask: Bool[np.ndarray, "h w"], config: UnseenConfig
+) -> Float[np.ndarray, "n 3"]:
     """Where the object may be: a grid over what its outline covers of the table, and around it."""
     eye, rays = pixel_rays(picture.camera, mask)
     down = rays[:, 2] < 0
@@ -82,10 +88,10 @@ def _places(picture: DepthPicture, mask: Bool[np.ndarray, "h w"]) -> Float[np.nd
         return np.empty((0, 3))
     on_table = eye[:2] - rays[down, :2] * (eye[2] / rays[down, 2])[:, None]
     middle = np.median(on_table, axis=0)
-    low = np.maximum(on_table.min(axis=0) - _AROUND_M, middle - _WIDEST_M / 2)
-    high = np.minimum(on_table.max(axis=0) + _AROUND_M, middle + _WIDEST_M / 2)
-    axes = [np.arange(low[axis], high[axis], _CELL_M) for axis in range(2)]
-    heights = np.arange(_CELL_M / 2, _HIGHEST_M, _CELL_M)
+    low = np.maximum(on_table.min(axis=0) - config.around_m, middle - config.extent_max_m / 2)
+    high = np.minimum(on_table.max(axis=0) + config.around_m, middle + config.extent_max_m / 2)
+    axes = [np.arange(low[axis], high[axis], config.cell_m) for axis in range(2)]
+    heights = np.arange(config.cell_m / 2, config.height_max_m, config.cell_m)
     return np.stack(np.meshgrid(*axes, heights, indexing="ij"), axis=-1).reshape(-1, 3)
 
 

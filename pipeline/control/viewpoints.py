@@ -3,18 +3,16 @@
 import numpy as np
 from jaxtyping import Float
 
-_APART_M = 0.12  # a second look nearer than this would show the same again
-
 
 def best_apart(
-    places_m: Float[np.ndarray, "k 3"], quality: Float[np.ndarray, " k"], count: int
+    places_m: Float[np.ndarray, "k 3"], quality: Float[np.ndarray, " k"], count: int, apart_m: float
 ) -> list[Float[np.ndarray, " 3"]]:
-    """The most promising places, each at least 120 mm from those before; at most ``count``."""
+    """The most promising places, each at least ``apart_m`` from those before; at most ``count``."""
     chosen: list[Float[np.ndarray, " 3"]] = []
     for index in np.argsort(-quality, kind="stable"):
         if len(chosen) == count:
             break
-        if all(np.linalg.norm(places_m[index] - other) >= _APART_M for other in chosen):
+        if all(np.linalg.norm(places_m[index] - other) >= apart_m for other in chosen):
             chosen.append(places_m[index])
     return chosen
 

@@ -11,13 +11,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from pipeline.config.evaluation import PolicyConfig
+from pipeline.config.policy import PolicyConfig
 from pipeline.control.robot import Reading
-
-CONTACT_N = 0.5  # a push on the pad that is a touch
-_TRIM_STEP_RAD = 0.06  # a control step
-_TRIM_LEVER_M = 0.25  # from the base to what hangs on it, about
-_TRIM_MOMENT_NM = 0.005  # less is not worth a tilt
 
 
 class Event(StrEnum):
@@ -44,7 +39,7 @@ class WrenchMonitor:
             return Event.COLLISION
         if not reading.followed:
             return Event.BLOCKED
-        if reading.wrench[2] > CONTACT_N:
+        if reading.wrench[2] > self._config.contact_n:
             return Event.CONTACT
         return Event.NOTHING
 
@@ -77,6 +72,7 @@ def trimmed(
     world_from_gripper: Float[np.ndarray, "4 4"],
     wrench: Float[np.ndarray, " 6"],
     left_rad: float,
+    config: PolicyConfig,
 ) -> tuple[Float[np.ndarray, "4 4"], float]:
     """The pose turned about the pad towards less moment at the base, and the angle turned.
 
@@ -87,10 +83,10 @@ def trimmed(
     force = wrench[:3]
     moment = wrench[3:] * [1.0, 1.0, 0.0]
     size = float(np.linalg.norm(moment))
-    if size < _TRIM_MOMENT_NM:
+    if size < config.trim_moment_nm:
         return world_from_gripper, 0.0
     aside_m = size / max(float(np.linalg.norm(force)), 1e-9)
-    angle = min(aside_m / _TRIM_LEVER_M, _TRIM_STEP_RAD, left_rad)
+    angle = min(aside_m / config.trim_lever_m, config.trim_step_rad, left_rad)
     turn = Rotation.from_rotvec(angle * moment / size).as_matrix()
     pose = world_from_gripper.copy()
     pose[:3, :3] = pose[:3, :3] @ turn

@@ -11,7 +11,7 @@ from pipeline.config import RunConfig
 from pipeline.config.evaluation import PolicyName
 from pipeline.control.decision import Cause, Decision, Strategy
 from pipeline.control.policy import Attempt
-from pipeline.control.ranking import NetworkRanking, Predict, flattest_at_the_top
+from pipeline.control.ranking import GeometricRanking, NetworkRanking, Predict
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.gripper.pad import build_pad
 from pipeline.physics.engine import Body, add_body, new_world
@@ -52,10 +52,11 @@ def strategy_of(name: PolicyName, predict: Predict, config: RunConfig) -> Strate
         predict,
         config.sensing,
         config.gripper.pad.radius_m,
-        config.evaluate.policy.smoothing_m,
+        config.evaluate.policy,
     )
     if name == "geometric":
-        return Strategy(name, flattest_at_the_top, several_views=False, corrects=False, feels=False)
+        geometric = GeometricRanking(config.evaluate.policy.picker)
+        return Strategy(name, geometric, several_views=False, corrects=False, feels=False)
     closed = name == "closed-loop"
     views = name in ("closed-loop", "uncorrected")
     return Strategy(name, network, several_views=views, corrects=closed, feels=closed)

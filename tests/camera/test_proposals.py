@@ -19,7 +19,7 @@ from pipeline.camera.proposals import (
 )
 from pipeline.config import RunConfig
 from pipeline.config.evaluation import HandConfig
-from pipeline.control.ranking import flattest_at_the_top
+from pipeline.control.ranking import GeometricRanking
 from pipeline.errors import PictureError
 from pipeline.geometry.transforms import frame_from_z
 from pipeline.world.cameras import points_of_depth
@@ -32,7 +32,9 @@ REAL = os.environ.get("REAL_FRAMES_DIR")
 
 
 def proposed(frames: list[Frame], config: RunConfig = CONFIG) -> Proposals:
-    return propose_grasps(frames, flattest_at_the_top, config, np.random.default_rng(0))
+    return propose_grasps(
+        frames, GeometricRanking(config.evaluate.policy.picker), config, np.random.default_rng(0)
+    )
 
 
 def test_the_best_grasp_lies_on_the_boxs_top() -> None:

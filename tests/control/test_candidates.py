@@ -6,7 +6,7 @@ from pipeline.config import EvaluateConfig
 from pipeline.control.candidates import Candidates, candidates_at, sample_near
 from pipeline.control.clearance import free_of_collision
 from pipeline.control.cloud import Cloud, merged_cloud
-from pipeline.control.ranking import flattest_at_the_top, smoothed
+from pipeline.control.ranking import GeometricRanking, smoothed
 from pipeline.labelling.sampling import contact_frames
 from tests.control.fakes import picture_of
 from tests.control.test_policy import plate
@@ -48,7 +48,9 @@ def test_merging_averages_noise_and_knows_no_density() -> None:
     eyes = [np.array([0.0, 0.1, 0.9]), np.array([0.3, 0.0, 0.5])]
     noisy = plate() + rng.normal(0, 0.001, (len(plate()), 3)) * [0, 0, 1]
     pictures = [picture_of(noisy, eye, np.zeros(3)) for eye in eyes]
-    one, other, both = (merged_cloud(p) for p in (pictures[:1], pictures[1:], pictures))
+    one, other, both = (
+        merged_cloud(p, 0.003, 0.006) for p in (pictures[:1], pictures[1:], pictures)
+    )
     assert len(both) < 0.8 * (len(one) + len(other))
     inside = np.abs(both.points_m[:, :2]).max(axis=1) < 0.045
     assert both.points_m[inside, 2].std() < 0.001
@@ -74,7 +76,9 @@ def test_a_post_beside_the_stem_is_in_the_way_of_one_pose_alone() -> None:
 def test_the_geometric_picker_wants_the_flattest_at_the_top() -> None:
     places = np.array([[0, 0, 0.10], [0, 0, 0.098], [0, 0, 0.05]])
     poses = contact_frames(places, np.tile([0, 0, 1.0], (3, 1)), np.zeros(3))
-    value = flattest_at_the_top([], Candidates(poses, np.array([0.002, 0.0005, 0.0])))
+    value = GeometricRanking(CONFIG.policy.picker)(
+        [], Candidates(poses, np.array([0.002, 0.0005, 0.0]))
+    )
     assert np.argsort(-value).tolist() == [1, 0, 2]
 
 
@@ -86,5 +90,5 @@ def test_smoothing_prefers_a_region_to_a_lucky_point() -> None:
     found = Candidates(contact_frames(places, up, np.zeros(10)), np.zeros(10))
     quality = np.array([0.5, 0.5, 0.9, 0.5, 0.5, 0.8, 0.8, 0.8, 0.8, 0.8])
     assert np.argmax(quality) == 2
-    assert np.argmax(smoothed(found, quality, 0.007)) >= 5
-    np.testing.assert_array_equal(smoothed(found, quality, 0.0), quality)
+    assert np.argmax(smoothed(found, quality, 0.007, 0.3)) >= 5
+    np.testing.assert_array_equal(smoothed(found, quality, 0.0, 0.3), quality)

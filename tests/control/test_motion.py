@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pipeline.config.policy import MotionConfig
 from pipeline.control.motion import Motion
 
 PERIOD_S = 1 / 15
@@ -22,7 +23,7 @@ def box(middle_m: np.ndarray, rng: np.random.Generator, noise_m: float = 0.0) ->
 
 def watched(velocity_m_s: np.ndarray, periods: int, noise_m: float, seed: int) -> Motion:
     rng = np.random.default_rng(seed)
-    motion = Motion(PERIOD_S, SEEN_M)
+    motion = Motion(PERIOD_S, SEEN_M, MotionConfig())
     for period in range(periods):
         passed_m = velocity_m_s * period * PERIOD_S
         motion.see(box(AIM_M + passed_m, rng, noise_m), AIM_M + passed_m)
@@ -50,7 +51,7 @@ def test_it_follows_far_beyond_the_first_picture() -> None:
 
 
 def test_nothing_seen_is_nothing_known() -> None:
-    motion = Motion(PERIOD_S, SEEN_M)
+    motion = Motion(PERIOD_S, SEEN_M, MotionConfig())
     motion.see(np.empty((0, 3)), AIM_M)
     motion.passed()
     motion.see(np.empty((0, 3)), AIM_M)
@@ -59,7 +60,7 @@ def test_nothing_seen_is_nothing_known() -> None:
 
 def test_an_even_surface_without_end_tells_nothing() -> None:
     rng = np.random.default_rng(3)
-    motion = Motion(PERIOD_S, SEEN_M)
+    motion = Motion(PERIOD_S, SEEN_M, MotionConfig())
     for _ in range(6):
         plate = rng.uniform(-0.15, 0.15, (30_000, 3))
         plate[:, 2] = 0.04 + rng.normal(0.0, 0.001, len(plate))
@@ -71,7 +72,7 @@ def test_an_even_surface_without_end_tells_nothing() -> None:
 def test_a_look_that_wanders_is_no_motion() -> None:
     """A picture shows what is around the aim; its border moves with the aim, the plate does not."""
     rng = np.random.default_rng(4)
-    motion = Motion(PERIOD_S, SEEN_M)
+    motion = Motion(PERIOD_S, SEEN_M, MotionConfig())
     plate = rng.uniform(-0.08, 0.08, (40_000, 3))
     plate[:, 2] = 0.04
     for aside_m in (0.0, 0.012, 0.024, 0.012):

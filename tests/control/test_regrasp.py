@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 
+from pipeline.config import PolicyConfig
 from pipeline.control.candidates import Candidates
 from pipeline.control.cloud import Cloud
 from pipeline.control.regrasp import hangs_below_m, top_of_column_m, worth_with_lever
@@ -34,17 +35,17 @@ def test_the_weight_is_found_below_its_centre_however_the_gripper_leans(
 def test_the_top_of_a_column_is_its_highest_point() -> None:
     points = np.array([[0.0, 0.0, 0.1], [0.01, 0.0, 0.2], [0.05, 0.0, 0.9]])
     cloud = Cloud(points, np.zeros((3, 3)))
-    found = top_of_column_m(cloud, np.zeros(2))
+    found = top_of_column_m(cloud, np.zeros(2), 0.02)
     assert found is not None
     assert_allclose(found, points[1])
-    assert top_of_column_m(cloud, np.array([0.3, 0.0])) is None
+    assert top_of_column_m(cloud, np.array([0.3, 0.0]), 0.02) is None
 
 
 def test_worth_falls_with_the_lever_and_is_nothing_where_little_is_gained() -> None:
     poses = np.tile(np.eye(4), (4, 1, 1))
     poses[:, 0, 3] = 0.0, 0.01, 0.03, 0.05
     worth = worth_with_lever(
-        np.full(4, 0.8), Candidates(poses, np.zeros(4)), np.zeros(2), lever_m=0.05, radius_m=0.025
+        np.full(4, 0.8), Candidates(poses, np.zeros(4)), np.zeros(2), 0.05, PolicyConfig()
     )
     assert worth[0] == 0.8
     assert worth[0] > worth[1] > worth[2] > 0.0

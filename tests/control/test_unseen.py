@@ -19,6 +19,8 @@ from tests.control.fakes import FakeEyes, FakeRobot
 SIDE_M, TOP_M = 0.06, 0.05
 MIDDLE_M = np.array([0.03, -0.02])
 GLASS, WOOD = 1, 2
+POLICY = EvaluateConfig().policy
+UNSEEN, ABOVE_TABLE_M = POLICY.unseen, POLICY.above_table_m
 K = np.array([[300.0, 0.0, 160.0], [0.0, 300.0, 120.0], [0.0, 0.0, 1.0]])
 
 
@@ -69,16 +71,17 @@ def test_the_table_is_at_height_zero_and_a_box_is_as_high_as_it_is() -> None:
 
 def test_only_what_depth_misses_is_unseen() -> None:
     pictures = [picture(eye, wood_m=np.array([-0.1, 0.05])) for eye in AROUND]
-    assert unseen_instances(pictures) == [GLASS]
+    assert unseen_instances(pictures, UNSEEN, ABOVE_TABLE_M) == [GLASS]
 
 
 def test_without_instances_nothing_is_told() -> None:
-    assert unseen_contacts([replace(picture(AROUND[0]), instances=None)]) == []
-    assert unseen_contacts([]) == []
+    unsegmented = [replace(picture(AROUND[0]), instances=None)]
+    assert unseen_contacts(unsegmented, UNSEEN, ABOVE_TABLE_M) == []
+    assert unseen_contacts([], UNSEEN, ABOVE_TABLE_M) == []
 
 
 def test_opposite_outlines_give_the_middle_and_bound_the_height() -> None:
-    contact = hull_top([picture(eye) for eye in AROUND], GLASS)
+    contact = hull_top([picture(eye) for eye in AROUND], GLASS, UNSEEN)
     assert contact is not None
     np.testing.assert_allclose(contact[:2, 3], MIDDLE_M, atol=0.008)
     assert TOP_M - 0.004 <= contact[2, 3] <= 2.5 * TOP_M
@@ -86,7 +89,7 @@ def test_opposite_outlines_give_the_middle_and_bound_the_height() -> None:
 
 
 def test_more_pictures_leave_less_room() -> None:
-    tops = [hull_top([picture(eye) for eye in AROUND[:n]], GLASS) for n in (1, 2, 3)]
+    tops = [hull_top([picture(eye) for eye in AROUND[:n]], GLASS, UNSEEN) for n in (1, 2, 3)]
     heights = [top[2, 3] for top in tops if top is not None]
     assert len(heights) == 3
     assert heights[0] >= heights[1] >= heights[2] < heights[0]
@@ -98,14 +101,14 @@ def test_what_stands_before_the_glass_hides_no_part_of_it() -> None:
     before = picture(AROUND[0], wood_m=MIDDLE_M + np.array([SIDE_M, 0.0]))
     seen, hidden = (np.count_nonzero(p.instances == GLASS) for p in (free[0], before))
     assert hidden < 0.9 * seen
-    contact = hull_top([before, *free[1:]], GLASS)
+    contact = hull_top([before, *free[1:]], GLASS, UNSEEN)
     assert contact is not None
     np.testing.assert_allclose(contact[:2, 3], MIDDLE_M, atol=0.012)
 
 
 def test_an_eye_that_looks_past_the_table_places_nothing() -> None:
     level = replace(free_of_table(), instances=np.full((240, 320), GLASS))
-    assert hull_top([level], GLASS) is None
+    assert hull_top([level], GLASS, UNSEEN) is None
 
 
 def free_of_table() -> DepthPicture:
