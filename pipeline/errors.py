@@ -6,8 +6,10 @@ class SoftgripError(Exception):
 
     Parameters
     ----------
-    what : the subject and what is wrong with it, naming the file or field.
-    remedy : what the reader can do about it.
+    what
+        The subject and what is wrong with it, naming the file or field.
+    remedy
+        What the reader can do about it.
     """
 
     def __init__(self, what: str, remedy: str) -> None:

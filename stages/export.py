@@ -37,8 +37,10 @@ def export_run(folder: RunFolder, wanted: Format, least_quality: float) -> Path:
 
     Raises
     ------
-    ArtifactError : what is to be exported was not made yet.
-    MachineError : the package that writes the format is not installed.
+    ArtifactError
+        What is to be exported was not made yet.
+    MachineError
+        The package that writes the format is not installed.
     """
     of_objects = wanted in (Format.ACRONYM, Format.GRASPGEN)
     source = folder.artifact("grasps" if of_objects else "shards")

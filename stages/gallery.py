@@ -33,7 +33,8 @@ def make_gallery(folder: RunFolder) -> None:
 
     Raises
     ------
-    ArtifactError : the run has no scenes yet.
+    ArtifactError
+        The run has no scenes yet.
     """
     scenes_path = folder.artifact("scenes")
     if not scenes_path.is_file():

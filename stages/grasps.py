@@ -190,8 +190,11 @@ def synthesize(
 ) -> list[tuple[GraspOrigin, LabelledGrasps]]:
     """Algorithm 1 on every object of a scene, from each of its viewpoints.
 
-    surfaces : of the scene, by `ray_scene`. S-1.01, the object's pose in SE(3), is where physics
-    left it.
+    Parameters
+    ----------
+    surfaces
+        Of the scene, by `ray_scene`. S-1.01, the object's pose in SE(3), is where physics left
+        it.
     """
     placed = scene.objects
     names = tuple(sorted({item.object_name for item in placed}))
@@ -271,7 +274,12 @@ def with_clouds(
 ) -> LabelledGrasps:
     """S-1.14, S-1.15: transform and desample, from all pictures for some, from one for the rest.
 
-    probability : with which each was kept. picture : of the view that proposed them.
+    Parameters
+    ----------
+    probability
+        With which each was kept.
+    picture
+        Of the view that proposed them.
     """
     merged = rng.random(len(candidates)) < config.grasps.merged_share
     frames, radius_m = candidates.world_from_contact, config.gripper.pad.radius_m
@@ -315,7 +323,10 @@ def label_rounds(
 ) -> tuple[Candidates, LabelBatch]:
     """S-1.04 - S-1.12 in two rounds: over all that is seen face on, then near what is rare.
 
-    surface : with at least one of its `contacts`.
+    Parameters
+    ----------
+    surface
+        With at least one of its `contacts`.
     """
     pad = pad_of(config)
     tried_on = surface.body_id[surface.contacts(config.grasps.seen_angle_max_rad)]
@@ -367,7 +378,10 @@ def visible_surface(
 ) -> VisibleSurface:
     """What the camera sees of the objects: exact points and normals under its pixels.
 
-    radius_m : how far around a contact the picture must show the scene, r_G.
+    Parameters
+    ----------
+    radius_m
+        How far around a contact the picture must show the scene, r_G.
     """
     origin, directions = pixel_rays(view.camera, view.segmentation > 0)
     hits = rays.cast(np.broadcast_to(origin, directions.shape), directions)

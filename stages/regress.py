@@ -62,7 +62,8 @@ def read_reference(path: Path) -> Figures:
 
     Raises
     ------
-    ArtifactError : there are none.
+    ArtifactError
+        There are none.
     """
     if not path.is_file():
         raise ArtifactError(f"{path} does not exist", "Make it: make regress ACCEPT=1")

@@ -29,7 +29,8 @@ def make_report(folder: RunFolder) -> Path:
 
     Raises
     ------
-    ArtifactError : the run has not even its objects.
+    ArtifactError
+        The run has not even its objects.
     """
     run = folder.path.name
     config = load_run_config(folder.config)

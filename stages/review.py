@@ -23,7 +23,8 @@ def recordings_of(folder: RunFolder, stage: str | None) -> list[Path]:
 
     Raises
     ------
-    ArtifactError : the stage is unknown, or nothing was recorded yet.
+    ArtifactError
+        The stage is unknown, or nothing was recorded yet.
     """
     if stage is not None and stage not in MADE:
         raise ArtifactError(f"There is no stage '{stage}'", f"Stages are {', '.join(MADE)}")

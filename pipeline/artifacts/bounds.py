@@ -45,7 +45,8 @@ class BoundedFile(io.BufferedReader):
 
         Raises
         ------
-        ArtifactError : more than a small piece is asked for and the file does not hold it.
+        ArtifactError
+            More than a small piece is asked for and the file does not hold it.
         """
         if size is not None and size > SMALL_READ_BYTES and size > self.size - self.tell():
             raise self.damaged(f"it declares {size} bytes where {self.size - self.tell()} are left")
@@ -56,7 +57,8 @@ class BoundedFile(io.BufferedReader):
 
         Raises
         ------
-        ArtifactError : a place outside the file is asked for.
+        ArtifactError
+            a place outside the file is asked for.
         """
         if whence == io.SEEK_SET and not 0 <= target <= self.size:
             raise self.damaged(f"it points to byte {target} of {self.size}")
@@ -79,7 +81,8 @@ def check_index(file: BoundedFile) -> int:
 
     Raises
     ------
-    ArtifactError : the file is no MCAP, is cut short, or its index fails its checksum.
+    ArtifactError
+        The file is no MCAP, is cut short, or its index fails its checksum.
     """
     start, footer_at, stored = _footer(file)
     index = file.read_at(start, footer_at - start + FOOTER.size - CRC_BYTES)
@@ -94,7 +97,8 @@ def check_data(file: BoundedFile) -> None:
 
     Raises
     ------
-    ArtifactError : they do not match.
+    ArtifactError
+        They do not match.
     """
     end = check_index(file) - DATA_END.size
     opcode, length, stored = DATA_END.unpack(file.read_at(end, DATA_END.size))
@@ -114,7 +118,8 @@ def check_chunk(file: BoundedFile, index: ChunkIndex) -> None:
 
     Raises
     ------
-    ArtifactError : it would decompress to more than ``MOST_CHUNK_BYTES``, or contradicts itself.
+    ArtifactError
+        It would decompress to more than ``MOST_CHUNK_BYTES``, or contradicts itself.
     """
     head = file.read_at(index.chunk_start_offset, CHUNK_HEAD.size)
     opcode, length, _, _, declared, _, name_bytes = CHUNK_HEAD.unpack(head)
@@ -138,7 +143,8 @@ def checked_attachment(file: BoundedFile, index: AttachmentIndex) -> bytes:
 
     Raises
     ------
-    ArtifactError : it fails its checksum.
+    ArtifactError
+        It fails its checksum.
     """
     record = file.read_at(index.offset, index.length)
     body, stored = record[RECORD_HEAD_BYTES:-CRC_BYTES], record[-CRC_BYTES:]

@@ -20,7 +20,12 @@ INDEX_NAME = ShardIndex.DESCRIPTOR.full_name
 class Contents:
     """What an artifact says of itself.
 
-    counts : topic → (schema, messages). shards : file → samples, of a sharded artifact's index.
+    Attributes
+    ----------
+    counts
+        Topic → (schema, messages).
+    shards
+        File → samples, of a sharded artifact's index.
     """
 
     path: Path
@@ -44,7 +49,8 @@ def contents_of(path: Path) -> Contents:
 
     Raises
     ------
-    ArtifactError : the file is missing, damaged or of another version.
+    ArtifactError
+        The file is missing, damaged or of another version.
     """
     with open_artifact(path) as artifact:
         counts = artifact.counts()

@@ -12,7 +12,8 @@ def file_name(name: str) -> str:
 
     Raises
     ------
-    ContentError : it is none, as ``../x`` or the empty name.
+    ContentError
+        It is none, as ``../x`` or the empty name.
     """
     if not _FILE_NAME.fullmatch(name):
         raise ContentError(f"{name[:80]!r} is no name of an object or a scene")

@@ -25,8 +25,12 @@ class Input:
 class Provenance:
     """What made a file. Equal provenance means equal bytes.
 
-    key : digest over configuration, code, machine and inputs; the freshness criterion.
-    key_parts : what that digest is over, as JSON; empty in files that do not tell it.
+    Attributes
+    ----------
+    key
+        Digest over configuration, code, machine and inputs; the freshness criterion.
+    key_parts
+        What that digest is over, as JSON; empty in files that do not tell it.
     """
 
     stage: str
@@ -57,7 +61,8 @@ class Provenance:
 
         Raises
         ------
-        ArtifactError : fields are missing or damaged, or another major schema version wrote it.
+        ArtifactError
+            Fields are missing or damaged, or another major schema version wrote it.
         """
         written = metadata.get("schema_version", "none")
         if written != SCHEMA_VERSION:

@@ -63,11 +63,17 @@ class Artifact:
     ) -> Iterator[tuple[int, M]]:
         """(log_time_ns, message) of every message of a type, in log-time order.
 
-        topic : that topic alone. at_ns : that log time alone.
+        Parameters
+        ----------
+        topic
+            That topic alone.
+        at_ns
+            That log time alone.
 
         Raises
         ------
-        ArtifactError : a topic carries another version of the type, or bytes are damaged.
+        ArtifactError
+            a topic carries another version of the type, or bytes are damaged.
         """
         wanted = kind.DESCRIPTOR.full_name
         topics = self._topics_of(wanted) if topic is None else [topic]
@@ -129,7 +135,8 @@ class Artifact:
 
         Raises
         ------
-        ArtifactError : something is damaged.
+        ArtifactError
+            Something is damaged.
         """
         with _named(self.path):
             check_data(self._file)
@@ -173,8 +180,9 @@ def open_artifact(path: Path) -> Iterator[Artifact]:
 
     Raises
     ------
-    ArtifactError : missing, not an MCAP, damaged, or of another version; also where what the
-        caller makes of its messages shows that they cannot be used.
+    ArtifactError
+        Missing, not an MCAP, damaged, or of another version; also where what the caller makes
+        of its messages shows that they cannot be used.
     """
     try:
         file = BoundedFile(path)

@@ -66,7 +66,8 @@ def listed_shards(path: Path, splits: Iterable[str] = ("train", "val", "test")) 
 
     Raises
     ------
-    ArtifactError : one that the index names is missing, or a name leads out of the folder.
+    ArtifactError
+        One that the index names is missing, or a name leads out of the folder.
     """
     wanted = set(splits)
     shards = []

@@ -20,7 +20,8 @@ def to_tensor(array: np.ndarray) -> Tensor:
 
     Raises
     ------
-    ArtifactError : the dtype is not one of ``DTYPES``.
+    ArtifactError
+        The dtype is not one of ``DTYPES``.
     """
     dtype = array.dtype.str[1:]
     if dtype not in DTYPES:
@@ -36,7 +37,8 @@ def from_tensor(tensor: Tensor) -> np.ndarray:
 
     Raises
     ------
-    ContentError : unknown dtype, or the bytes do not fill the declared shape.
+    ContentError
+        Unknown dtype, or the bytes do not fill the declared shape.
     """
     if tensor.dtype not in DTYPES:
         raise ContentError(f"Tensor of unknown dtype '{tensor.dtype}'")
@@ -58,7 +60,10 @@ def set_tensors(
 ) -> None:
     """Fill several tensors of a message, each converted to its dtype.
 
-    arrays : those that ``stored_as`` names, and any others.
+    Parameters
+    ----------
+    arrays
+        Those that ``stored_as`` names, and any others.
     """
     for name, dtype in stored_as.items():
         getattr(message, name).CopyFrom(to_tensor(arrays[name].astype(dtype)))
@@ -72,12 +77,17 @@ def tensors_of(
 ) -> dict[str, np.ndarray]:
     """Several tensors of a message, each of its dtype and all of shapes that fit together.
 
-    shapes : field → sides such as ``"n g g 3"``; a letter is one length wherever it stands.
-    unless_there : fields that files of an older program lack → what they hold instead.
+    Parameters
+    ----------
+    shapes
+        Field → sides such as ``"n g g 3"``; a letter is one length wherever it stands.
+    unless_there
+        Fields that files of an older program lack → what they hold instead.
 
     Raises
     ------
-    ContentError : one has another dtype or shape.
+    ContentError
+        One has another dtype or shape.
     """
     arrays: dict[str, np.ndarray] = {}
     lengths: dict[str, int] = {}

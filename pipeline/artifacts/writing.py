@@ -59,8 +59,9 @@ class ArtifactWriter:
 
         Raises
         ------
-        ArtifactError : the topic already carries another message type, or the message is larger
-            than readers accept.
+        ArtifactError
+            The topic already carries another message type, or the message is larger than readers
+            accept.
         """
         name = message.DESCRIPTOR.full_name
         channel, carried = self._channels.get(topic, (0, name))

@@ -92,8 +92,8 @@ def camera_of(content: Any, source: str) -> CameraFile:
     Raises
     ------
     PictureError
-        There are no intrinsics, a number is no number, the lens is distorted, or the pose is not
-        rigid.
+        There are no intrinsics, a number is no number, the lens is distorted, or the pose is
+        not rigid.
     """
     if isinstance(content, list):
         content = {"intrinsics": content}

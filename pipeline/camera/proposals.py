@@ -264,7 +264,10 @@ def pixels_of(
 ) -> tuple[Int[np.ndarray, "k 2"], Bool[np.ndarray, " k"]]:
     """Column and row of points of the frame's world, and whether they lie in its picture.
 
-    within : whether the picture's edges count; else all that lies ahead of the camera does.
+    Parameters
+    ----------
+    within
+        Whether the picture's edges count; else all that lies ahead of the camera does.
     """
     local = transform_points(invert(frame.camera.world_from_camera), points_m)
     k = frame.camera.intrinsics

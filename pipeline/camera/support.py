@@ -38,7 +38,8 @@ class Support:
     outline_m
         Corners of the plane's visible part, in its own x and y, shape (n, 2).
     rim_m
-        Height of the walls' upper edge over the plane; infinite where there are not two walls [m].
+        Height of the walls' upper edge over the plane; infinite where there are not two walls
+        [m].
     """
 
     world_from_support: Float[np.ndarray, "4 4"]

@@ -35,7 +35,8 @@ def build_clutter(
 
     Raises
     ------
-    SceneError : no attempt met the definition; the last reason is in the message.
+    SceneError
+        No attempt met the definition; the last reason is in the message.
     """
     _, distribution = level_of(level)
     rng = np.random.Generator(np.random.PCG64(seed))
@@ -92,7 +93,8 @@ def measured(
 
     Raises
     ------
-    SceneError : a gap misses the level, or a body sinks, floats or intersects another.
+    SceneError
+        a gap misses the level, or a body sinks, floats or intersects another.
     """
     needed = {
         Distribution.ISOLATED: config.isolated_gap_min_m,

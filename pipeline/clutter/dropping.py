@@ -28,7 +28,8 @@ def resting_pose(
 
     Raises
     ------
-    SceneError : it never came to rest, in several tries.
+    SceneError
+        It never came to rest, in several tries.
     """
     for _ in range(_TRIES_ALONE):
         world = new_world(config, render=False)
@@ -53,7 +54,8 @@ def pile(
 
     Raises
     ------
-    SceneError : the pile never came to rest.
+    SceneError
+        The pile never came to rest.
     """
     world = new_world(config, render=False)
     half = _COLUMN_WIDTH * max(float(item.mesh.extents_m.max()) for item in items) / 2

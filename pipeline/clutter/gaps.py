@@ -71,10 +71,14 @@ def pairwise_gaps_m(
 ) -> Float[np.ndarray, "n n"]:
     """Gap of every pair [m], inf on the diagonal.
 
-    beyond_m : pairs whose bounding boxes are farther apart than this are not measured and get
-        the boxes' distance, which is a lower bound of the gap.
-    known, known_poses : gaps by the same ``beyond_m`` at other poses; a pair of which neither
-        has moved since keeps its own.
+    Parameters
+    ----------
+    beyond_m
+        Pairs whose bounding boxes are farther apart than this are not measured and get the
+        boxes' distance, which is a lower bound of the gap.
+    known, known_poses
+        Gaps by the same ``beyond_m`` at other poses; a pair of which neither has moved since
+        keeps its own.
     """
     count = len(surfaces)
     gaps = np.full((count, count), NO_NEIGHBOUR_M)
@@ -99,8 +103,11 @@ def nearest_gaps_m(
 ) -> Float[np.ndarray, " n"]:
     """Gap of each body to its nearest neighbour [m], measured; inf for a lone body.
 
-    bounds_m : lower bounds of the gaps, as of ``pairwise_gaps_m``: pairs whose bound exceeds a
-        gap already found are not measured.
+    Parameters
+    ----------
+    bounds_m
+        Lower bounds of the gaps, as of ``pairwise_gaps_m``: pairs whose bound exceeds a gap
+        already found are not measured.
     """
     nearest = np.full(len(surfaces), NO_NEIGHBOUR_M)
     for i in range(len(surfaces)):

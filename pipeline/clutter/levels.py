@@ -21,7 +21,8 @@ def level_of(level: int) -> tuple[ShapeClass, Distribution]:
 
     Raises
     ------
-    ValueError : not a level.
+    ValueError
+        Not a level.
     """
     if level not in LEVELS:
         raise ValueError(f"levels go from 1 to 9 (Table II), got {level}")

@@ -33,7 +33,8 @@ def place_isolated(
 
     Raises
     ------
-    SceneError : no room was found for an object.
+    SceneError
+        No room was found for an object.
     """
     placed: list[Float[np.ndarray, "4 4"]] = [np.eye(4)] * len(surfaces)
     boxes: dict[int, Box] = {}
@@ -75,7 +76,8 @@ def place_multiple(
 
     Raises
     ------
-    SceneError : an object found no place on the table.
+    SceneError
+        An object found no place on the table.
     """
     placed = [turned(resting[0], rng.uniform(0, 2 * np.pi))]
     for index in range(1, len(surfaces)):

@@ -20,8 +20,12 @@ _FEWEST_POINTS = 6  # a plane through fewer is no surface
 class Candidates:
     """Poses to try; arrays of one length k.
 
-    world_from_contact : origin at the contact, +z out along the mean normal.
-    roughness_m : root mean square distance of the points around from their plane.
+    Attributes
+    ----------
+    world_from_contact
+        Origin at the contact, +z out along the mean normal.
+    roughness_m
+        Root mean square distance of the points around from their plane.
     """
 
     world_from_contact: Float[np.ndarray, "k 4 4"]

@@ -21,9 +21,13 @@ _CUBES_A_SIDE = 1 << 20  # cubes are numbered within ± 1.5 km
 class DepthPicture:
     """A depth image and the camera that took it, with its pose in WCS.
 
-    depth_m : (h, w); what is not above zero, NaN included, was not measured.
-    instances : which object each pixel shows by its colour, 0 for none; None where nothing
-        segments the pictures.
+    Attributes
+    ----------
+    depth_m
+        (h, w); what is not above zero, NaN included, was not measured.
+    instances
+        Which object each pixel shows by its colour, 0 for none; None where nothing segments the
+        pictures.
     """
 
     depth_m: Float[np.ndarray, "h w"]

@@ -31,9 +31,15 @@ class Cause(StrEnum):
 class Strategy:
     """How attempts are made.
 
-    several_views : whether the wrist looks before the choice. corrects : whether it looks again
-    on the way down. feels : whether the wrench is heeded: what the first tug shows not to hold is
-    grasped elsewhere, nearer to the load's centre where one is felt, and the lift is trimmed.
+    Attributes
+    ----------
+    several_views
+        Whether the wrist looks before the choice.
+    corrects
+        Whether it looks again on the way down.
+    feels
+        Whether the wrench is heeded: what the first tug shows not to hold is grasped elsewhere,
+        nearer to the load's centre where one is felt, and the lift is trimmed.
     """
 
     name: PolicyName
@@ -47,7 +53,10 @@ class Strategy:
 class Decision:
     """How an attempt went, as far as the policy knows; filled in as it goes.
 
-    spoilt_m : contacts that did not hold in the first tug.
+    Attributes
+    ----------
+    spoilt_m
+        Contacts that did not hold in the first tug.
     """
 
     cause: Cause = Cause.EMPTY_CLOUD

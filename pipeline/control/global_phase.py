@@ -51,7 +51,11 @@ class GlobalPhase:
         rng: np.random.Generator,
         avoid_m: Sequence[Float[np.ndarray, " 3"]],
     ) -> None:
-        """avoid_m : contacts that failed before, tried again only where nothing else is left."""
+        """Parameters
+        ----------
+        avoid_m
+            Contacts that failed before, tried again only where nothing else is left.
+        """
         self._eyes = eyes
         self._robot = robot
         self._ranking = strategy.ranking
@@ -66,8 +70,11 @@ class GlobalPhase:
     def look(self, decision: Decision, travel: Travel | None) -> Cause | None:
         """Rank all that is seen; what is seen and ranked is noted in the decision.
 
-        travel : brings the wrist's camera above what is promising; None: only what stands beside
-        the table looks.
+        Parameters
+        ----------
+        travel
+            Brings the wrist's camera above what is promising; None: only what stands beside the
+            table looks.
         """
         pictures = self._eyes.static()
         if pictures is None:
@@ -114,7 +121,10 @@ class GlobalPhase:
     ) -> Choice | None:
         """A contact nearer to the line on which a load hangs.
 
-        lever_m : horizontal lever of the contact that did not hold.
+        Parameters
+        ----------
+        lever_m
+            Horizontal lever of the contact that did not hold.
         """
         cloud = self._cloud(pictures)
         top = top_of_column_m(cloud, place_m, self._policy.regrasp_column_m)

@@ -90,8 +90,12 @@ def height_map(
 ) -> HeightMap:
     """Greatest height about each cell, as far as was looked.
 
-    points : x, y in cells from the middle of the square; z [m].
-    looked_at, radius_cells : the disc that was looked at, in cells.
+    Parameters
+    ----------
+    points
+        x, y in cells from the middle of the square; z [m].
+    looked_at, radius_cells
+        The disc that was looked at, in cells.
     """
     heights = np.zeros((2 * half_cells + 1,) * 2)
     cell = np.round(points[:, :2]).astype(np.int64) + half_cells
@@ -109,7 +113,10 @@ def shift_between(
 ) -> Float[np.ndarray, " 2"]:
     """By how many cells the heights have moved, to a fraction of one; 0 where none fits better.
 
-    after : the same place in a larger square; what it is larger by bounds the shift.
+    Parameters
+    ----------
+    after
+        The same place in a larger square; what it is larger by bounds the shift.
     """
 
     def correlated(a: Float[np.ndarray, "m m"], b: Float[np.ndarray, "n n"]) -> np.ndarray:

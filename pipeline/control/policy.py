@@ -40,7 +40,11 @@ class Attempt:
         rng: np.random.Generator,
         avoid_m: Sequence[Float[np.ndarray, " 3"]] = (),
     ) -> None:
-        """avoid_m : contacts that failed before, tried again only where nothing else is left."""
+        """Parameters
+        ----------
+        avoid_m
+            Contacts that failed before, tried again only where nothing else is left.
+        """
         self._eyes = eyes
         self._robot = robot
         self._strategy = strategy

@@ -27,12 +27,20 @@ class State(StrEnum):
 class Reading:
     """What the robot felt during one control step.
 
-    world_from_gripper : the pose reached at its end.
-    wrench : (6,) mean force [N] and moment [N m] that the world exerts on the gripper, at the
+    Attributes
+    ----------
+    world_from_gripper
+        The pose reached at its end.
+    wrench
+        (6,) mean force [N] and moment [N m] that the world exerts on the gripper, at the
         gripper's base (the flange), in GCS; its own weight is taken off. An object that hangs
         on a level pad pulls along -z.
-    peak_n : largest force during the step [N].
-    arrived : whether the target was reached. followed : False where the arm could not go on.
+    peak_n
+        Largest force during the step [N].
+    arrived
+        Whether the target was reached.
+    followed
+        False where the arm could not go on.
     """
 
     world_from_gripper: Float[np.ndarray, "4 4"]

@@ -35,9 +35,13 @@ class Outcome:
 class Advantage:
     """How two policies compare on the same clutters; rates are means over clutters.
 
-    p_paired : two-sided, of the mean difference under exchange of the two policies within each
-        clutter (a permutation test): attempts at one clutter are not independent, clutters are.
-    p_fisher : Fisher's exact test on all attempts, as if they were.
+    Attributes
+    ----------
+    p_paired
+        Two-sided, of the mean difference under exchange of the two policies within each clutter
+        (a permutation test): attempts at one clutter are not independent, clutters are.
+    p_fisher
+        Fisher's exact test on all attempts, as if they were.
     """
 
     rate: float

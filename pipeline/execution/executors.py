@@ -41,12 +41,16 @@ def run_in_order(
     One worker runs in this process. Processes are spawned, not forked: drivers
     of graphics and threads of native libraries do not survive a fork.
 
-    ahead_per_worker : results that may wait for their turn; many where they are small and
-        items take unequal time.
+    Parameters
+    ----------
+    ahead_per_worker
+        Results that may wait for their turn; many where they are small and items take unequal
+        time.
 
     Raises
     ------
-    SoftgripError : a worker process died (killed, or out of memory).
+    SoftgripError
+        a worker process died (killed, or out of memory).
     """
     if executor == "ray":
         from pipeline.execution.ray_executor import run_on_ray  # an optional package

@@ -28,8 +28,10 @@ def run_on_ray(job: Callable[[Item], Result], items: Iterable[Item]) -> Iterator
 
     Raises
     ------
-    MachineError : Ray is not installed, or no cluster answers.
-    SoftgripError : a job's node died more often than it is tried again.
+    MachineError
+        Ray is not installed, or no cluster answers.
+    SoftgripError
+        a job's node died more often than it is tried again.
     """
     try:
         import ray

@@ -29,8 +29,8 @@ class Stage:
     shown
         Configuration that says how much its recording shows.
     drawn_apart
-        Its recording is drawn from its finished artifact, by `drawing_module`, so that what only
-        draws makes the recording anew and leaves the artifact.
+        Its recording is drawn from its finished artifact, by `drawing_module`, so that what
+        only draws makes the recording anew and leaves the artifact.
     """
 
     name: str

@@ -49,7 +49,7 @@ def stage_context(
     Raises
     ------
     ConfigError
-        run.toml cannot be used.
+        Run.toml cannot be used.
     ArtifactError
         An upstream artifact is missing.
     MachineError

@@ -33,8 +33,10 @@ class LabelBatch:
 
     Attributes
     ----------
-    weights : least, greatest and root-mean-square deviation from 1 of W.
-    status : values of `GraspStatus`.
+    weights
+        Least, greatest and root-mean-square deviation from 1 of W.
+    status
+        Values of `GraspStatus`.
     """
 
     q: Float[np.ndarray, " batch"]
@@ -99,9 +101,11 @@ def label_batch(
 
     Parameters
     ----------
-    heights_m : z_s, height of the scene under each vertex along z of each grasp's own
-        GCS, from any origin [m]; NaN or -inf where nothing is below.
-    on_target : whether what lies under a vertex is the object to be grasped.
+    heights_m
+        z_s, height of the scene under each vertex along z of each grasp's own GCS, from any
+        origin [m]; NaN or -inf where nothing is below.
+    on_target
+        Whether what lies under a vertex is the object to be grasped.
 
     Notes
     -----

@@ -14,11 +14,16 @@ class Contact:
 
     Attributes
     ----------
-    triangles : indices into `Pad.triangles`.
-    areas_m2 : A^{t_j}, deformed areas [m2].
-    normals : (n_x, n_y, n_z) of each, unit length, n_z > 0.
-    centres_m : geometric centres [m].
-    pressure : p of Eq. (2) [1].
+    triangles
+        Indices into `Pad.triangles`.
+    areas_m2
+        A^{t_j}, deformed areas [m2].
+    normals
+        (n_x, n_y, n_z) of each, unit length, n_z > 0.
+    centres_m
+        Geometric centres [m].
+    pressure
+        p of Eq. (2) [1].
     """
 
     triangles: Int[np.ndarray, " n"]

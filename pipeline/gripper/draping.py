@@ -35,8 +35,8 @@ def drape_reference(
 
     Parameters
     ----------
-    heights_m : z_s, height of the scene under each vertex [m]; NaN or -inf where
-        nothing is below.
+    heights_m
+        z_s, height of the scene under each vertex [m]; NaN or -inf where nothing is below.
 
     Returns
     -------

@@ -32,8 +32,10 @@ def wrench_limits(
 
     Parameters
     ----------
-    vacuum_force : F_v of Eq. (7), in units of G.
-    friction : mu [1].
+    vacuum_force
+        F_v of Eq. (7), in units of G.
+    friction
+        Mu [1].
     """
     lower, upper = wrench_limit_ratios(friction)
     return vacuum_force * lower, vacuum_force * upper

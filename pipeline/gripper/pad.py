@@ -21,17 +21,28 @@ class Pad:
 
     Attributes
     ----------
-    vertices_xy_m : V of the supplement, x and y in GCS [m].
-    triangles : T of the supplement, vertex indices, counter-clockwise seen from +z.
-    edges : every edge of the triangulation once, ordered from the centre outwards.
-    areas_m2 : undeformed area of each triangle [m2].
-    in_seal_region : which triangles are Reg.V, that is, lie inside r_v.
-    ring_radii_m : radius of each ring [m].
-    sectors : number of sectors of the polar grid.
-    seal_area_m2 : A of Reg.V in Eq. (2) [m2].
-    area_m2 : A^G, area of the whole flat pad [m2].
-    radius_m : r_G [m].
-    config : what the pad was built from.
+    vertices_xy_m
+        V of the supplement, x and y in GCS [m].
+    triangles
+        T of the supplement, vertex indices, counter-clockwise seen from +z.
+    edges
+        Every edge of the triangulation once, ordered from the centre outwards.
+    areas_m2
+        Undeformed area of each triangle [m2].
+    in_seal_region
+        Which triangles are Reg.V, that is, lie inside r_v.
+    ring_radii_m
+        Radius of each ring [m].
+    sectors
+        Number of sectors of the polar grid.
+    seal_area_m2
+        A of Reg.V in Eq. (2) [m2].
+    area_m2
+        A^G, area of the whole flat pad [m2].
+    radius_m
+        r_G [m].
+    config
+        What the pad was built from.
     """
 
     vertices_xy_m: Float[np.ndarray, "vertices 2"]

@@ -25,13 +25,20 @@ class QualityProblem:
 
     Attributes
     ----------
-    wrench_matrix : G of S-1.10, dimensionless.
-    vacuum_force : F_v of Eq. (7) in units of G, >= 0.
-    lower, upper : bounds of GW, Eq. (8)-(11).
-    target : Lambda, the wrench of a full flat seal.
-    scale : s.
-    weight_spread : sigma_W of Eq. (13); Eq. (12) makes the weights sum to n.
-    max_iterations : bound on a solver's iterations; Supplement III.
+    wrench_matrix
+        G of S-1.10, dimensionless.
+    vacuum_force
+        F_v of Eq. (7) in units of G, >= 0.
+    lower, upper
+        Bounds of GW, Eq. (8)-(11).
+    target
+        Lambda, the wrench of a full flat seal.
+    scale
+        s.
+    weight_spread
+        sigma_W of Eq. (13); Eq. (12) makes the weights sum to n.
+    max_iterations
+        Bound on a solver's iterations; Supplement III.
     """
 
     wrench_matrix: Float[np.ndarray, "4 n"]
@@ -50,9 +57,12 @@ class QpSolution:
 
     Attributes
     ----------
-    weights : W of Eq. (12); all ones unless `status` is SOLVED or MAX_ITERATIONS.
-    status : SOLVED, INFEASIBLE or MAX_ITERATIONS.
-    iterations : iterations used, 0 where none was needed.
+    weights
+        W of Eq. (12); all ones unless `status` is SOLVED or MAX_ITERATIONS.
+    status
+        SOLVED, INFEASIBLE or MAX_ITERATIONS.
+    iterations
+        Iterations used, 0 where none was needed.
     """
 
     weights: Float[np.ndarray, " n"]

@@ -34,16 +34,23 @@ class GraspQuality:
 
     Attributes
     ----------
-    q : grasp quality in [0, 1]; 0 if infeasible or without contact.
-    pressure : p of Eq. (2) [1].
-    wrench : GW, dimensionless; at W = 1 where `status` is INFEASIBLE.
-    slacks : room to each limit of Eq. (8)-(11), as in `limits.limit_slacks`.
-    weights : summary of W.
-    contact : which vertices of the pad are in contact with the target.
-    touch_height_m : highest point of the scene under the pad, along z of the frame that
-        the heights came in: there the flat pad touches first, and there is the origin
-        of GCS. -inf over nothing.
-    status, iterations : the solver's.
+    q
+        Grasp quality in [0, 1]; 0 if infeasible or without contact.
+    pressure
+        p of Eq. (2) [1].
+    wrench
+        GW, dimensionless; at W = 1 where `status` is INFEASIBLE.
+    slacks
+        Room to each limit of Eq. (8)-(11), as in `limits.limit_slacks`.
+    weights
+        Summary of W.
+    contact
+        Which vertices of the pad are in contact with the target.
+    touch_height_m
+        Highest point of the scene under the pad, along z of the frame that the heights came in:
+        there the flat pad touches first, and there is the origin of GCS. -inf over nothing.
+    status, iterations
+        The solver's.
     """
 
     q: float
@@ -99,8 +106,10 @@ def triangle_pressure(
 
     Parameters
     ----------
-    draped_m : z(v) of S-1.07, from any origin [m].
-    vertex_contact : which vertices are in contact with the target.
+    draped_m
+        z(v) of S-1.07, from any origin [m].
+    vertex_contact
+        Which vertices are in contact with the target.
     """
     pressure = np.zeros(len(pad.triangles))
     contact = contact_of(pad, draped_m, vertex_contact)
@@ -120,9 +129,11 @@ def label_reference(
 
     Parameters
     ----------
-    heights_m : z_s, height of the scene under each vertex along z of GCS, from any
-        origin [m]; NaN or -inf where nothing is below.
-    on_target : whether what lies under the vertex is the object to be grasped.
+    heights_m
+        z_s, height of the scene under each vertex along z of GCS, from any origin [m]; NaN or
+        -inf where nothing is below.
+    on_target
+        Whether what lies under the vertex is the object to be grasped.
     """
     draped = drape_reference(pad, heights_m)
     vertex_contact = contact_vertices(pad, draped, heights_m, on_target)

@@ -21,7 +21,8 @@ def wrench_matrix(pad: Pad, contact: Contact, friction: float) -> Float[np.ndarr
 
     Parameters
     ----------
-    friction : mu of Eq. (3) and (4) [1].
+    friction
+        Mu of Eq. (3) and (4) [1].
     """
     pull = contact.pressure * contact.areas_m2 / pad.area_m2
     n_x, n_y, n_z = contact.normals.T

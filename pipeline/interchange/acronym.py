@@ -21,7 +21,10 @@ def write_acronym(
 ) -> Path:
     """``meshes/<name>.obj`` and ``grasps/<name>_1.h5`` of one object.
 
-    least_quality : the q from which on a grasp is a success. density [kg/m3], friction [1].
+    Parameters
+    ----------
+    least_quality
+        The q from which on a grasp is a success. density [kg/m3], friction [1].
     """
     item = grasps.item
     mesh_file = f"meshes/{item.name}.obj"

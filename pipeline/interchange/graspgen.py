@@ -18,7 +18,10 @@ LISTS = {"train": "train.txt", "val": "valid.txt", "test": "test.txt"}
 def write_graspgen(folder: Path, grasps: ObjectGrasps, least_quality: float) -> Path:
     """``objects/<name>.obj`` and ``grasps/<name>.json`` of one object.
 
-    least_quality : the q from which on a grasp is a success.
+    Parameters
+    ----------
+    least_quality
+        The q from which on a grasp is a success.
     """
     item = grasps.item
     mesh_file = f"{item.name}.obj"

@@ -24,9 +24,16 @@ GCS_FROM_BASE = np.diag([1.0, -1.0, -1.0, 1.0])
 class ObjectGrasps:
     """All grasps of one object, whatever scene they are from; arrays of one length n.
 
-    object_from_base : (n, 4, 4) gripper base, +z along the approach, in the object's frame.
-    quality, pressure, wrench : (n,), (n,), (n, 4) q, p and GW, as labelled in the scene.
-    level : (n,) of Table II. scene : (n,) name of the scene: a label holds among its neighbours.
+    Attributes
+    ----------
+    object_from_base
+        (n, 4, 4) gripper base, +z along the approach, in the object's frame.
+    quality, pressure, wrench
+        (n,), (n,), (n, 4) q, p and GW, as labelled in the scene.
+    level
+        (n,) of Table II.
+    scene
+        (n,) name of the scene: a label holds among its neighbours.
     """
 
     item: CatalogueObject

@@ -19,8 +19,12 @@ def write_webdataset(
 
     Clouds are (g, g, 3) in units of r_G; the json has q, p, level, class, object, how many pictures
     the cloud was cut from, and the first proposals it stands for (null where that is unknown).
-    names : what ``object_index`` points into. Keys are ``prefix`` and a
-    number, which is ``first`` for the first sample.
+
+    Parameters
+    ----------
+    names
+        What ``object_index`` points into. Keys are ``prefix`` and a number, which is ``first``
+        for the first sample.
     """
     with published(path) as scratch, webdataset.TarWriter(str(scratch), mtime=0) as tar:
         for row in range(len(samples)):

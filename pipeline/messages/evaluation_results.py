@@ -14,9 +14,14 @@ ALL_LEVELS = 0
 
 @dataclass(frozen=True)
 class Results:
-    """levels : every policy at every level. policies : every policy over all levels (level 0).
-
-    comparisons : the first policy against each of the others.
+    """Attributes
+    ----------
+    levels
+        Every policy at every level.
+    policies
+        Every policy over all levels (level 0).
+    comparisons
+        The first policy against each of the others.
     """
 
     levels: list[LevelResult]

@@ -52,15 +52,28 @@ PADS_SHAPES = {"grasp": "k", "height_m": "k v", "pressure": "k t"}
 class LabelledGrasps:
     """Grasps of one scene seen from one viewpoint; arrays of one length n.
 
-    world_from_gripper : (n, 4, 4) GCS at first touch, in WCS.
-    quality, pressure : (n,) q of S-1.12 and p of Eq. (2).
-    wrench : (n, 4) GW, dimensionless. limit_slack : (n, 8) room to Eq. (8)-(11).
-    weight_summary : (n, 3) least, greatest and rms deviation from 1 of W.
-    contact_mask : (n, v) pad vertices in contact.
-    tilt_rad, proposal, keep_probability : the sampler's bias.
-    cloud, cloud_mask : (n, g, g, 3) and (n, g, g), units of r_G, origin at the contact.
-    touch_height_m : (n,) first touch above the contact.
-    pictures : (n,) how many pictures the cloud was cut from: one, or all of the scene.
+    Attributes
+    ----------
+    world_from_gripper
+        (n, 4, 4) GCS at first touch, in WCS.
+    quality, pressure
+        (n,) q of S-1.12 and p of Eq. (2).
+    wrench
+        (n, 4) GW, dimensionless.
+    limit_slack
+        (n, 8) room to Eq. (8)-(11).
+    weight_summary
+        (n, 3) least, greatest and rms deviation from 1 of W.
+    contact_mask
+        (n, v) pad vertices in contact.
+    tilt_rad, proposal, keep_probability
+        The sampler's bias.
+    cloud, cloud_mask
+        (n, g, g, 3) and (n, g, g), units of r_G, origin at the contact.
+    touch_height_m
+        (n,) first touch above the contact.
+    pictures
+        (n,) how many pictures the cloud was cut from: one, or all of the scene.
     """
 
     object_index: Integer[np.ndarray, " n"]
@@ -127,7 +140,8 @@ def grasps_of(message: GraspBatch) -> tuple[GraspOrigin, LabelledGrasps]:
 
     Raises
     ------
-    ContentError : a tensor is missing, or they do not fit together.
+    ContentError
+        a tensor is missing, or they do not fit together.
     """
     arrays = tensors_of(message, STORED_AS, SHAPES, UNLESS_THERE)
     if arrays["contact_mask"].shape[1] != -(-message.pad_vertices // 8):
@@ -155,9 +169,14 @@ def grasps_of(message: GraspBatch) -> tuple[GraspOrigin, LabelledGrasps]:
 class ShownPads:
     """Pads of some grasps of a shard, draped.
 
-    grasp : number of each grasp within its shard.
-    height_m : z(v) of S-1.07, in GCS.
-    pressure : p w_j of each triangle, 0 where it is not in contact.
+    Attributes
+    ----------
+    grasp
+        Number of each grasp within its shard.
+    height_m
+        z(v) of S-1.07, in GCS.
+    pressure
+        p w_j of each triangle, 0 where it is not in contact.
     """
 
     grasp: Integer[np.ndarray, " k"]

@@ -57,7 +57,8 @@ def object_of(message: objects_pb2.CatalogueObject) -> CatalogueObject:
 
     Raises
     ------
-    ContentError : it has no such class, a mesh that is none, or a name that is no file's.
+    ContentError
+        It has no such class, a mesh that is none, or a name that is no file's.
     """
     if message.shape_class not in set(ShapeClass):
         raise ContentError(f"'{message.name}' is of class '{message.shape_class}'")

@@ -34,12 +34,17 @@ def cached_split(index: Path, split: str, cache: Path) -> Samples:
 
     Several processes may ask at once: one decodes, the others wait.
 
-    index : the index of a sharded artifact. cache : folder for the decoded files.
+    Parameters
+    ----------
+    index
+        The index of a sharded artifact.
+    cache
+        Folder for the decoded files.
 
     Raises
     ------
-    ArtifactError : a shard is missing, damaged, or not the one that the index names; or the split
-        is empty.
+    ArtifactError
+        a shard is missing, damaged, or not the one that the index names; or the split is empty.
     """
     entries = [entry for entry in read_index(index).shards if entry.split == split]
     folder = cache / f"{split}-{cache_key(entries)}"
@@ -72,7 +77,10 @@ def cache_key(entries: Iterable[ShardEntry]) -> str:
 def decode_shards(shards: dict[Path, ShardEntry], into: Path) -> None:
     """Read shards one after another, a message in memory at a time, into a file a field.
 
-    shards : file → what the index says of it.
+    Parameters
+    ----------
+    shards
+        File → what the index says of it.
     """
     count = sum(entry.samples for entry in shards.values())
     arrays: dict[str, np.memmap] = {}
@@ -98,7 +106,8 @@ def _reserve(path: Path) -> None:
 
     Raises
     ------
-    ArtifactError : there is not enough.
+    ArtifactError
+        There is not enough.
     """
     try:
         with path.open("rb+") as file:

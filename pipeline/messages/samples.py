@@ -43,7 +43,8 @@ def samples_of(message: SampleBatch) -> Samples:
 
     Raises
     ------
-    ContentError : a tensor is missing, or they do not fit together.
+    ContentError
+        a tensor is missing, or they do not fit together.
     """
     arrays = tensors_of(message, STORED_AS, SHAPES, UNLESS_THERE)
     arrays["cloud_mask"] = arrays["cloud_mask"].view(bool)

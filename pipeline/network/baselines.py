@@ -48,10 +48,14 @@ def seal_ratio(
 
     Parameters
     ----------
-    cloud : points in GCS in units of r_G.
-    mask : cells that hold a measured point.
-    seal_radius : r_v in units of r_G.
-    tolerance : distance from the plane that still counts as near, in units of r_G.
+    cloud
+        Points in GCS in units of r_G.
+    mask
+        Cells that hold a measured point.
+    seal_radius
+        r_v in units of r_G.
+    tolerance
+        Distance from the plane that still counts as near, in units of r_G.
     """
     n = len(mask)
     points = np.where(mask[..., None], cloud, 0).astype(np.float64)

@@ -57,9 +57,12 @@ def network_input(
 
     Parameters
     ----------
-    cloud : points in GCS, in units of r_G; unseen cells may hold anything finite or not.
-    mask : cells that hold a measured point.
-    channels : one of ``KNOWN_CHANNELS``: a network's own.
+    cloud
+        Points in GCS, in units of r_G; unseen cells may hold anything finite or not.
+    mask
+        Cells that hold a measured point.
+    channels
+        One of ``KNOWN_CHANNELS``: a network's own.
 
     Returns
     -------
@@ -128,8 +131,10 @@ def apply_symmetry(
 
     Parameters
     ----------
-    inputs : canonical inputs on a square grid, h = w, of ``channels``.
-    elements : integers in [0, 8).
+    inputs
+        Canonical inputs on a square grid, h = w, of ``channels``.
+    elements
+        Integers in [0, 8).
     """
     b, c, h, w = inputs.shape
     sources, matrices = _symmetry_tables(h, inputs.device)

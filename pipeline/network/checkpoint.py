@@ -40,7 +40,8 @@ def load_checkpoint_bytes(data: bytes) -> GaCnn:
 
     Raises
     ------
-    ContentError : the bytes are no checkpoint, are damaged, or are of another version.
+    ContentError
+        The bytes are no checkpoint, are damaged, or are of another version.
     """
     tensors, metadata = tensors_from_bytes(data, "network checkpoint")
     if metadata.get("format") != FORMAT:
@@ -108,7 +109,8 @@ def tensors_from_bytes(data: bytes, what: str) -> tuple[dict[str, Tensor], dict[
 
     Raises
     ------
-    ContentError : the bytes are not whole safetensors; the message calls them ``what``.
+    ContentError
+        The bytes are not whole safetensors; the message calls them ``what``.
     """
     try:
         tensors = load(data)

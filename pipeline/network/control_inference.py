@@ -40,7 +40,8 @@ class ControlPredictor:
 
         Raises
         ------
-        ContentError : the bytes are no such export, or of another version.
+        ContentError
+            The bytes are no such export, or of another version.
         """
         taken = check_onnx_bytes(data)
         self._channels, self._cells = taken.channels, taken.cells
@@ -101,11 +102,15 @@ def checked_against(
 ) -> float:
     """Largest |q̂ of the export − q̂ of the network| over sample clouds.
 
-    batch_size, threads : of the network; the predictor has its own.
+    Parameters
+    ----------
+    batch_size, threads
+        Of the network; the predictor has its own.
 
     Raises
     ------
-    ArtifactError : it exceeds 1e-4.
+    ArtifactError
+        It exceeds 1e-4.
     """
     exported = predictor.predict(cloud, mask)
     expected = predict(network, cloud, mask, batch_size, threads, average_symmetries=False)

@@ -53,7 +53,10 @@ def control_input(
 ) -> Float[np.ndarray, "b c h w"]:
     """Canonical input of GA-CNN, of ``canonical.CHANNELS``, in single precision.
 
-    cloud, mask : as for ``canonical.network_input``.
+    Parameters
+    ----------
+    cloud, mask
+        As for ``canonical.network_input``.
     """
     count, height, width = mask.shape
     inputs = np.zeros((count, len(CHANNELS), height, width), dtype=np.float32)

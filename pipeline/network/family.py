@@ -36,7 +36,12 @@ VARIANTS: tuple[Variant, ...] = ("ga-cnn", "no attention", "no augmentation")
 class Member:
     """One network to train.
 
-    group : "family" of Fig. 1, or "ablation". seed : of its weights and its order of samples.
+    Attributes
+    ----------
+    group
+        "family" of Fig. 1, or "ablation".
+    seed
+        Of its weights and its order of samples.
     """
 
     group: Literal["family", "ablation"]
@@ -91,7 +96,8 @@ def members(sweep: SweepConfig, of_run: NetworkConfig, seed: int) -> list[Member
 
     Raises
     ------
-    ConfigError : a depth or a channel set is no member's.
+    ConfigError
+        a depth or a channel set is no member's.
     """
     family = [
         Member("family", "ga-cnn", NetworkConfig(layers=layers, channels=channels), seed)

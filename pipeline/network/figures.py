@@ -44,7 +44,8 @@ def mean_absolute_error(
 
     Raises
     ------
-    ArtifactError : there are no samples, or their numbers disagree.
+    ArtifactError
+        There are no samples, or their numbers disagree.
     """
     if predicted.shape != quality.shape or predicted.size == 0:
         raise ArtifactError(

@@ -65,7 +65,8 @@ def blocks_per_stage(layers: int) -> tuple[int, int, int, int]:
 
     Raises
     ------
-    ConfigError : no member of the family has this depth; the message names those that exist.
+    ConfigError
+        No member of the family has this depth; the message names those that exist.
     """
     if layers % LAYERS_PER_BLOCK or not SHALLOWEST <= layers <= DEEPEST:
         raise ConfigError(
@@ -151,8 +152,10 @@ class GaCnn(nn.Module):
 
     Attributes
     ----------
-    config : what the network was built from.
-    channels : of its input, see ``canonical.network_input``.
+    config
+        What the network was built from.
+    channels
+        Of its input, see ``canonical.network_input``.
     """
 
     def __init__(self, config: NetworkConfig, channels: Channels = CHANNELS) -> None:
@@ -200,7 +203,8 @@ def build_network(config: NetworkConfig, seed: int, channels: Channels = CHANNEL
 
     Raises
     ------
-    ConfigError : ``config`` names no member of the family.
+    ConfigError
+        ``config`` names no member of the family.
     """
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)

@@ -45,8 +45,8 @@ class TestFigures:
     mae_single
         The same without averaging over the symmetries.
     mae_as_proposed, mean_predictor_mae_as_proposed
-        Over grasps as the first round draws them (``Samples.proposal_weight``), where labels are
-        not balanced; None where that is unknown.
+        Over grasps as the first round draws them (``Samples.proposal_weight``), where labels
+        are not balanced; None where that is unknown.
     mean_predictor_mae, seal_ratio_mae
         Errors of the baselines.
     by_class

@@ -21,10 +21,13 @@ def predict(
 
     Parameters
     ----------
-    cloud : points in GCS in units of r_G, grid as in ``canonical``.
-    mask : cells that hold a measured point.
-    average_symmetries : mean over the eight turns and mirrors under which q does not change:
-        a lower error at eight times the cost.
+    cloud
+        Points in GCS in units of r_G, grid as in ``canonical``.
+    mask
+        Cells that hold a measured point.
+    average_symmetries
+        Mean over the eight turns and mirrors under which q does not change: a lower error at
+        eight times the cost.
     """
     model.eval()
     predicted = np.empty(len(cloud), dtype=np.float32)

@@ -44,7 +44,8 @@ def part_of_rank(
 
     Raises
     ------
-    ConfigError : a batch has fewer samples than there are processes.
+    ConfigError
+        a batch has fewer samples than there are processes.
     """
     smallest = min(len(batch) for batch in batches)
     if smallest < ranks:
@@ -82,7 +83,10 @@ def load_batches(
 ) -> Iterator[RawBatch]:
     """The batches in order, read by this process or ahead of it by ``workers`` others.
 
-    pinned : batches are put where a GPU copies from fastest.
+    Parameters
+    ----------
+    pinned
+        Batches are put where a GPU copies from fastest.
     """
     items = SampleBatches(samples, batches)
     if not workers and not pinned:

@@ -32,8 +32,10 @@ def draped_gap(z: Float[Tensor, "b h w"], seen: Bool[Tensor, "b h w"]) -> Float[
 
     Parameters
     ----------
-    z : heights of the cells in GCS, in units of r_G.
-    seen : cells that hold a measured point under the pad; the others hold nothing up.
+    z
+        Heights of the cells in GCS, in units of r_G.
+    seen
+        Cells that hold a measured point under the pad; the others hold nothing up.
 
     Returns
     -------

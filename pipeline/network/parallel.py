@@ -20,9 +20,14 @@ from torch import Tensor, distributed, nn
 class Ranks:
     """This process's place among those that train together.
 
-    rank : its number, 0 for the one that saves and reports.
-    count : how many there are.
-    local : its number on this machine, that of the GPU it takes.
+    Attributes
+    ----------
+    rank
+        Its number, 0 for the one that saves and reports.
+    count
+        How many there are.
+    local
+        Its number on this machine, that of the GPU it takes.
     """
 
     rank: int = 0

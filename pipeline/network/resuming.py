@@ -22,12 +22,18 @@ class EpochMetrics:
 
     Attributes
     ----------
-    epoch : counted from 0.
-    learning_rate : at the epoch's last step.
-    train_loss : mean loss over the epoch's samples, as they were seen (augmented, in training).
-    train_mae : mean |q̂ − q| over the same.
-    val_mae : mean |q̂ − q| over the validation samples after the epoch.
-    samples : samples seen in the epoch, by all processes together.
+    epoch
+        Counted from 0.
+    learning_rate
+        At the epoch's last step.
+    train_loss
+        Mean loss over the epoch's samples, as they were seen (augmented, in training).
+    train_mae
+        Mean |q̂ − q| over the same.
+    val_mae
+        Mean |q̂ − q| over the validation samples after the epoch.
+    samples
+        Samples seen in the epoch, by all processes together.
     """
 
     epoch: int
@@ -44,10 +50,14 @@ class Standing:
 
     Attributes
     ----------
-    history : the finished epochs.
-    best_weights : of the epoch with the lowest validation error; initial ones before any.
-    batch : batches done of the epoch that runs.
-    sums : loss, |q̂ − q| and samples, summed over those batches and all processes.
+    history
+        The finished epochs.
+    best_weights
+        Of the epoch with the lowest validation error; initial ones before any.
+    batch
+        Batches done of the epoch that runs.
+    sums
+        Loss, |q̂ − q| and samples, summed over those batches and all processes.
     """
 
     history: list[EpochMetrics]
@@ -61,7 +71,10 @@ def save_standing(
 ) -> None:
     """Everything the next batch needs; schedule and generators follow from its number.
 
-    identity : all that the training's result depends on, as text.
+    Parameters
+    ----------
+    identity
+        All that the training's result depends on, as text.
     """
     tensors = {f"model/{name}": tensor for name, tensor in model.state_dict().items()}
     tensors |= {f"best/{name}": tensor for name, tensor in standing.best_weights.items()}
@@ -84,7 +97,8 @@ def load_standing(
 
     Raises
     ------
-    ArtifactError : the state is damaged.
+    ArtifactError
+        The state is damaged.
     """
     tensors, metadata = tensors_from_bytes(path.read_bytes(), str(path))
     if metadata.get("identity") != identity:

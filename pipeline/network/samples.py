@@ -20,15 +20,19 @@ class GraspTensors:
 
     Attributes
     ----------
-    cloud : points in GCS in units of r_G, half or single precision; y grows with the row, x with
+    cloud
+        Points in GCS in units of r_G, half or single precision; y grows with the row, x with
         the column (see ``canonical``).
-    mask : cells that hold a measured point.
-    quality : q in [0, 1].
+    mask
+        Cells that hold a measured point.
+    quality
+        q in [0, 1].
 
     Raises
     ------
-    ArtifactError : on construction, where shapes disagree, a quality is outside [0, 1], or the
-        grid lies the other way.
+    ArtifactError
+        On construction, where shapes disagree, a quality is outside [0, 1], or the grid lies
+        the other way.
     """
 
     cloud: Float[np.ndarray, "n h w 3"]
@@ -70,13 +74,22 @@ class GraspTensors:
 class Samples:
     """What training reads; arrays of one length n.
 
-    cloud, cloud_mask : (n, g, g, 3) and (n, g, g), units of r_G, origin at the contact.
-    quality, pressure : (n,) q and p. shape_class : (n,) 0 basic, 1 typical, 2 complex.
-    object_index : (n,) into the catalogue's names, kept beside.
-    proposal_weight : (n,) how many grasps of the first round, drawn as S-1.04 - S-1.06 say and
-    before labels were balanced, a sample stands for; 0 for one proposed near a rare label. NaN
-    where the shards, of an older program, do not say.
-    pictures : (n,) how many pictures the cloud was cut from.
+    Attributes
+    ----------
+    cloud, cloud_mask
+        (n, g, g, 3) and (n, g, g), units of r_G, origin at the contact.
+    quality, pressure
+        (n,) q and p.
+    shape_class
+        (n,) 0 basic, 1 typical, 2 complex.
+    object_index
+        (n,) into the catalogue's names, kept beside.
+    proposal_weight
+        (n,) how many grasps of the first round, drawn as S-1.04 - S-1.06 say and before labels
+        were balanced, a sample stands for; 0 for one proposed near a rare label. NaN where the
+        shards, of an older program, do not say.
+    pictures
+        (n,) how many pictures the cloud was cut from.
     """
 
     cloud: Float[np.ndarray, "n g g 3"]

@@ -30,9 +30,12 @@ def milliseconds_a_grasp(
 
     Parameters
     ----------
-    predict : clouds and masks to quality, as one batch.
-    cloud, mask : grasps to predict; repeated where a batch is larger.
-    seconds : so long, and at least three times, each batch size is called.
+    predict
+        Clouds and masks to quality, as one batch.
+    cloud, mask
+        Grasps to predict; repeated where a batch is larger.
+    seconds
+        So long, and at least three times, each batch size is called.
     """
     figures = {}
     for size in batches:

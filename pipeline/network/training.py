@@ -61,14 +61,19 @@ class TrainedNetwork:
 
     Attributes
     ----------
-    network : weights of the best epoch, on the CPU, ready to predict.
-    best_epoch : the epoch of the lowest validation error.
-    val_mae : that error.
-    history : every epoch, those before an interruption too.
-    stopped_early : patience ran out before the last epoch.
-    waiting_share, preparing_share : shares of this call's steps that were spent waiting for
-        samples to be read, and making canonical inputs of them; None where no step was left to
-        take.
+    network
+        Weights of the best epoch, on the CPU, ready to predict.
+    best_epoch
+        The epoch of the lowest validation error.
+    val_mae
+        That error.
+    history
+        Every epoch, those before an interruption too.
+    stopped_early
+        Patience ran out before the last epoch.
+    waiting_share, preparing_share
+        Shares of this call's steps that were spent waiting for samples to be read, and making
+        canonical inputs of them; None where no step was left to take.
     """
 
     network: GaCnn
@@ -97,19 +102,28 @@ def train(
 
     Parameters
     ----------
-    state_dir : where the resume state lives, seen by all processes. A state of other arguments
-        there is overwritten.
-    on_epoch : called by the first process after each epoch of this call, when its state is safe.
-    ranks : this process's place among those that train together; all call this alike.
-    loader_workers : processes that read batches ahead; 0 reads them in between.
-    save_every_s : within an epoch the state is saved when so much time has passed.
-    show_progress : a bar an epoch.
+    state_dir
+        Where the resume state lives, seen by all processes. A state of other arguments there is
+        overwritten.
+    on_epoch
+        Called by the first process after each epoch of this call, when its state is safe.
+    ranks
+        This process's place among those that train together; all call this alike.
+    loader_workers
+        Processes that read batches ahead; 0 reads them in between.
+    save_every_s
+        Within an epoch the state is saved when so much time has passed.
+    show_progress
+        a bar an epoch.
 
     Raises
     ------
-    ConfigError : ``network`` names no member of the family, or batches are too small to divide.
-    MachineError : ``config.device`` asks for a GPU and there is none.
-    ArtifactError : the resume state is damaged.
+    ConfigError
+        ``network`` names no member of the family, or batches are too small to divide.
+    MachineError
+        ``config.device`` asks for a GPU and there is none.
+    ArtifactError
+        The resume state is damaged.
     """
     device = chosen_device(config.device, ranks)
     identity = _identity(config, network, seed, train_set, val_set, device)
@@ -204,7 +218,10 @@ def ready_batches(
 ) -> Iterator[Batch]:
     """Canonical inputs and qualities on the device, batch by batch.
 
-    symmetry : for each sample of the set the element that turns or mirrors it.
+    Parameters
+    ----------
+    symmetry
+        For each sample of the set the element that turns or mirrors it.
     """
     for indices, cloud, mask, quality in loaded:
         inputs = network_input(
@@ -239,7 +256,8 @@ def chosen_device(wanted: str, ranks: Ranks) -> torch.device:
 
     Raises
     ------
-    MachineError : a GPU is asked for by name and there is none.
+    MachineError
+        a GPU is asked for by name and there is none.
     """
     available = torch.cuda.is_available()
     if wanted == "cuda" and not available:

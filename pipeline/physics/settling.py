@@ -17,7 +17,8 @@ def settle(world: sapien.Scene, bodies: Sequence[Body], config: ScenesConfig) ->
 
     Raises
     ------
-    SceneError : still moving after ``settle_max_s``, or a body left the table.
+    SceneError
+        Still moving after ``settle_max_s``, or a body left the table.
     """
     resting_s = elapsed_s = 0.0
     while resting_s < config.settle_hold_s:

@@ -80,7 +80,10 @@ def shown_robot(config: RunConfig) -> ShownRobot:
 def blueprint(with_arm: bool = False, scale: float = 1.0) -> rrb.Blueprint:
     """Opens on the worst failure; where an arm reaches in, from beside it.
 
-    scale : of the pad against Table I's; without effect where an arm sets the view.
+    Parameters
+    ----------
+    scale
+        Of the pad against Table I's; without effect where an arm sets the view.
     """
     eye_m = (0.5, -1.05, 0.8) if with_arm else (-0.55 * scale, -0.55 * scale, 0.5 * scale)
     target_m = (-0.2, 0.0, 0.25) if with_arm else (0.0, 0.0, 0.08 * scale)

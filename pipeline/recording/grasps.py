@@ -39,9 +39,14 @@ Steps = Sequence[rr.TimeColumn]
 class ShownGrasp:
     """One grasp of the recording.
 
-    placed : the objects of its scene.
-    pad_height_m : draped pad, z in GCS at first touch.
-    pad_pressure : p w_j of each triangle, as in `triangle_pressure`.
+    Attributes
+    ----------
+    placed
+        The objects of its scene.
+    pad_height_m
+        Draped pad, z in GCS at first touch.
+    pad_pressure
+        p w_j of each triangle, as in `triangle_pressure`.
     """
 
     placed: Sequence[PlacedObject]

@@ -91,12 +91,15 @@ def recording(stage: Recorded, blueprint: rrb.Blueprint) -> Iterator[rr.Recordin
 
     Parameters
     ----------
-    stage : its name, the recording's place and identity, and the stopwatch that runs meanwhile.
-    blueprint : how the viewer lays the recording out.
+    stage
+        Its name, the recording's place and identity, and the stopwatch that runs meanwhile.
+    blueprint
+        How the viewer lays the recording out.
 
     Raises
     ------
-    OSError : the disk is full.
+    OSError
+        The disk is full.
     """
     path = stage.recording
     with published(path) as scratch, stage.drawing.running(whole_process=True):

@@ -31,9 +31,14 @@ _TRIES = 3  # beyond the first; the viewer gives up on a picture after some seco
 class Sight:
     """What a person sees who opens a recording.
 
-    window_png, view_png : the whole window, and each view by its name, those behind tabs left out.
-    problems : what the viewer could not show, and why.
-    timeline : the timeline it opens on.
+    Attributes
+    ----------
+    window_png, view_png
+        The whole window, and each view by its name, those behind tabs left out.
+    problems
+        What the viewer could not show, and why.
+    timeline
+        The timeline it opens on.
     """
 
     window_png: bytes
@@ -45,12 +50,17 @@ class Sight:
 def sight_of(recording: Path, step: int | None = None) -> Sight:
     """Open ``recording`` in the viewer, off screen, and look once it stands still.
 
-    step : where on its timeline; None is where it opens by itself.
+    Parameters
+    ----------
+    step
+        Where on its timeline; None is where it opens by itself.
 
     Raises
     ------
-    MachineError : the viewer does not start, as without any graphics driver.
-    SoftgripError : the recording does not finish loading.
+    MachineError
+        The viewer does not start, as without any graphics driver.
+    SoftgripError
+        The recording does not finish loading.
     """
     with off_screen_viewer() as client:
         client.open(str(recording.resolve()))

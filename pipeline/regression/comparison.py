@@ -12,9 +12,14 @@ Figures = dict[str, dict[str, Value]]
 class Rule:
     """How the quantities of a group are called and how far one may move.
 
-    name : of one of them, its item in place of ``{}``.
-    absolute, relative : the larger of both is allowed; none of both means equal.
-    between : groups that hold the least and the greatest value allowed, item by item.
+    Attributes
+    ----------
+    name
+        Of one of them, its item in place of ``{}``.
+    absolute, relative
+        The larger of both is allowed; none of both means equal.
+    between
+        Groups that hold the least and the greatest value allowed, item by item.
     """
 
     name: str

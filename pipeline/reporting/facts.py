@@ -53,7 +53,8 @@ def read_summary(path: Path) -> dict[str, Any] | None:
 
     Raises
     ------
-    ArtifactError : the file is damaged.
+    ArtifactError
+        The file is damaged.
     """
     try:
         summary = json.loads(path.read_text())

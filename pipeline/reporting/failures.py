@@ -74,7 +74,10 @@ def failure_picture(
 ) -> bytes | None:
     """JPEG of an attempt when the pad was lowest, drawn by rays; None where nothing moved.
 
-    names : the scene's objects by body id, from 1. The same attempt gives the same bytes.
+    Parameters
+    ----------
+    names
+        The scene's objects by body id, from 1. The same attempt gives the same bytes.
     """
     pads = from_tensor(attempt.gripper_path).reshape(-1, 4, 4)
     bodies = from_tensor(attempt.object_paths).reshape(len(pads), -1, 4, 4)

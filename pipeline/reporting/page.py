@@ -36,7 +36,10 @@ def cell(value: object) -> str:
 def html_page(markdown: str, title: str, files: Mapping[str, bytes]) -> str:
     """The page of a Markdown text, the pictures it shows inside.
 
-    files : path as the text names it → content.
+    Parameters
+    ----------
+    files
+        Path as the text names it → content.
     """
     parser = MarkdownIt("commonmark", {"html": False}).enable("table")
     parser.add_render_rule("image", _embedded)

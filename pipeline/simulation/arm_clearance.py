@@ -41,7 +41,11 @@ class ArmClearance:
     def __init__(
         self, hand: HandConfig, pad_radius_m: float, base_z_m: float, margin_m: float = MARGIN_M
     ) -> None:
-        """base_z_m : of the arm's foot above the table."""
+        """Parameters
+        ----------
+        base_z_m
+            Of the arm's foot above the table.
+        """
         self._parts = _parts(hand, pad_radius_m, margin_m / 2)
         self._pairs = [
             (a, b) for a, b in combinations(self._parts, 2) if abs(a.place - b.place) > _NEAR

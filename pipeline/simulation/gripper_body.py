@@ -34,7 +34,12 @@ _LEVER_M = 0.2  # a turn counts as the way of a point this far from the axis
 class Sample:
     """Things as they stood at the end of a control step.
 
-    wrench : at the base, in GCS. joints_rad : of the arm, empty where there is none.
+    Attributes
+    ----------
+    wrench
+        At the base, in GCS.
+    joints_rad
+        Of the arm, empty where there is none.
     """
 
     time_s: float
@@ -57,7 +62,11 @@ class SuctionGripper:
         config: RunConfig,
         mover: Mover,
     ) -> None:
-        """bodies : those in the world; whoever takes one out of it takes it out here too."""
+        """Parameters
+        ----------
+        bodies
+            Those in the world; whoever takes one out of it takes it out here too.
+        """
         self._world = world
         self._bodies = bodies
         self._objects = objects

@@ -26,8 +26,16 @@ _FACE_M = 0.006
 class Scenario:
     """What lies on the table, and how fast it passes.
 
-    sides_m : of each box. gap_m : between two boxes that stand side by side along their y.
-    speed_m_s : along world x, as on a conveyor. segmented : whether objects are told by colour.
+    Attributes
+    ----------
+    sides_m
+        Of each box.
+    gap_m
+        Between two boxes that stand side by side along their y.
+    speed_m_s
+        Along world x, as on a conveyor.
+    segmented
+        Whether objects are told by colour.
     """
 
     name: str

@@ -56,8 +56,11 @@ def holding(
 def breaks(limits: Holding, load: Float[np.ndarray, " 6"]) -> bool:
     """Whether a load is more than the seal holds.
 
-    load : force [N] and moment [N m] that the object exerts on the pad, in GCS; a pull
-    away from the pad is along -z.
+    Parameters
+    ----------
+    load
+        Force [N] and moment [N m] that the object exerts on the pad, in GCS; a pull away from
+        the pad is along -z.
     """
     pull = max(-float(load[2]), 0.0)
     return (
