@@ -69,7 +69,7 @@ def cut(label: str, polygons: Polygons) -> tuple[Int[np.ndarray, "t 3"], tuple[s
     starts = np.cumsum(counts) - counts
     pieces = [np.zeros((0, 3), dtype=np.int64)]
     owners = [np.zeros(0, dtype=np.int64)]
-    worst = _Flatness(label, float(np.ptp(polygons.vertices, axis=0).max(initial=0.0)))
+    worst = _Flatness(label, float(np.ptp(polygons.vertices, axis=0).max()))
     for size in np.unique(counts[counts >= 3]).tolist():
         chosen = np.flatnonzero(counts == size)
         rows = corners[starts[chosen, None] + np.arange(size)]

@@ -33,6 +33,7 @@ from pipeline.geometry.polygons import Polygons
 
 _VERTEX = re.compile(rb"^[ \t]*v(?=[ \t\n])([^\n]*)", re.MULTILINE)
 _FACE = re.compile(rb"^[ \t]*fo?(?=[ \t\n])([^\n]*)", re.MULTILINE)
+_ENDS_IN_FACE = re.compile(rb"\n[ \t]*f[^\n]*\n\Z")
 _CONTINUED = re.compile(rb"(?:[^\n]*\\[ \t]*\n)+[^\n]*")
 _CONTINUES = re.compile(rb"\\[ \t]*\n")
 _FREE_FORM = re.compile(rb"^[ \t]*(surf|curv)[ \t]", re.MULTILINE)
@@ -60,6 +61,8 @@ def read(label: str, data: bytes, max_faces: int) -> Surface:
         rows = [line.split() for line in lines]
         counts = np.fromiter(map(len, rows), dtype=np.int64, count=len(rows))
         words = list(chain.from_iterable(rows))
+        if len(rows[-1]) < 3 and data[-1:] not in b"\r\n" and _ENDS_IN_FACE.search(text):
+            raise MeshError(f"{label} is truncated: it ends within a face", EXPORT_AGAIN)
     corners = _corners(label, text, words, counts, len(vertices))
     return surface_of(label, Polygons(vertices, corners, counts))
 

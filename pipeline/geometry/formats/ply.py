@@ -198,6 +198,7 @@ def _rows_of_bytes(
     for element in elements:
         if element.name == "vertex" and not element.lists:
             fields = _record(element.properties, order, {})
+            check_long_enough(label, len(data) - at, fields.itemsize * element.count)
             rows = np.frombuffer(data, fields, element.count, at) if element.count else None
             if rows is not None:
                 points = np.stack([rows[_field(element, axis)] for axis in "xyz"], axis=1)

@@ -32,6 +32,7 @@ _TEXT_START = re.compile(rb"\s*solid\b", re.IGNORECASE)
 # What a text file's first bytes have none of.
 _BINARY = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
 _LOOKED_AT = 1024
+_LARGEST = 1e12  # no unit makes a coordinate of an object as large as this
 _FACET = re.compile(rb"[^\n]*\s*facet\s+normal.*\svertex\s", re.IGNORECASE | re.DOTALL)
 _VERTEX = re.compile(rb"^[ \t]*vertex(?=[ \t\n])([^\n]*)", re.MULTILINE)
 _MARK = re.compile(rb"^[ \t]*(vert(?=ex[ \t\n])|endl(?=oop[ \t\n]))", re.MULTILINE)
@@ -81,9 +82,9 @@ def _binary(label: str, data: bytes, max_faces: int) -> Surface:
     if declared == present and declared:
         check_faces_allowed(label, declared, max_faces)
         return _welded(label, _records(data, _HEADER_BYTES, declared))
-    if declared > present and declared not in _NEVER_COUNTED:
-        check_faces_allowed(label, declared, max_faces)
     check_faces_allowed(label, present, max_faces)
+    if declared != present and not _plausible(data, present):
+        raise MeshError(f"{label} is neither a binary nor a text STL", EXPORT_AGAIN)
     if present == 0 and (declared == 0 or surplus == 0):
         if declared:
             raise _truncated(label, declared, present)
@@ -106,6 +107,15 @@ def _binary(label: str, data: bytes, max_faces: int) -> Surface:
         "closed surface",
         EXPORT_AGAIN,
     )
+
+
+def _plausible(data: bytes, present: int) -> bool:
+    """Whether records that are not counted right look like triangles at all."""
+    if not present:
+        return True
+    corners = np.frombuffer(data, _RECORD, min(present, _LOOKED_AT), _HEADER_BYTES)["corners"]
+    finite = corners[np.isfinite(corners)]
+    return bool(np.abs(finite).max(initial=0.0) < _LARGEST)
 
 
 def _truncated(label: str, declared: int, present: int) -> MeshError:

@@ -30,6 +30,8 @@ def surface_of(label: str, polygons: Polygons, notes: tuple[str, ...] = ()) -> S
 
     Raises MeshError where vertices that are used are not finite, or a polygon cannot be cut.
     """
+    if not (polygons.counts >= 3).any():
+        raise MeshError(f"{label} has no faces of three or more corners", "Export its surface")
     used = np.zeros(len(polygons.vertices), dtype=bool)
     used[polygons.corners] = True
     vertices, corners = polygons.vertices, polygons.corners

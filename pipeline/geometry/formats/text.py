@@ -14,6 +14,7 @@ _CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
 _NOT_A_NUMBER = re.compile(rb"[+-]?(1\.#(IND|QNAN|SNAN|INF)\d*|s?nan\(.*\))", re.IGNORECASE)
 _ANY_COMMENT = re.compile(rb"#[^\n]*")
 _COMMENT = re.compile(rb"(?:(?<!1\.)#|#(?!IND|QNAN|SNAN|INF))[^\n]*")
+_FORTRAN = re.compile(rb"([\d.])[dD](?=[+-]?\d)")  # 1.0D-2
 _COMMA = re.compile(rb"[+-]?\d*,\d+([eE][+-]?\d+)?|[+-]?[\d.]+,")
 
 
@@ -27,6 +28,7 @@ def text_of(label: str, data: bytes) -> bytes:
     text = data.removeprefix(_MARK).rstrip(b"\x1a \t\r\n\0")  # padding, and the end mark of DOS
     if b"\r" in text:
         text = text.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    text = text.replace(b"\x0b", b" ").replace(b"\x0c", b" ")  # blanks to all that read words
     found = _CONTROL.search(text)
     if found:
         line = text.count(b"\n", 0, found.start()) + 1
@@ -48,8 +50,11 @@ def without_comments(text: bytes) -> bytes:
 
 def reals(label: str, words: Sequence[bytes]) -> Float[np.ndarray, " n"]:
     """Numbers from words. Raises MeshError that says of the first that is none what it is."""
+    joined = b" ".join(words)
+    if (b"d" in joined or b"D" in joined) and _FORTRAN.search(joined):
+        words = _FORTRAN.sub(rb"\1e", joined).split()
     try:
-        if b"_" not in b" ".join(words):  # Python reads 1_0 as ten
+        if b"_" not in joined:  # Python reads 1_0 as ten
             return np.fromiter(map(float, words), dtype=np.float64, count=len(words))
     except ValueError:
         pass
@@ -81,7 +86,7 @@ def check_number(where: str, word: bytes) -> None:
             "Export the mesh with decimal points",
         )
     try:
-        float(word)
+        float(_FORTRAN.sub(rb"\1e", word))
     except ValueError:
         pass
     else:

@@ -39,6 +39,7 @@ def cases() -> Iterator[Case]:
     yield Case("glb_text.glb", gltf(TRIANGLES, Gltf(text=True)), "text glTF named GLB", BOX)
     yield from _strips()
     yield from _placed()
+    yield _halves()
     yield from _beside()
     yield from _refused()
 
@@ -118,6 +119,18 @@ def _placed() -> Iterator[Case]:
     yield Case(
         "glb_mirror_image.glb", writer.finish(tree), "a part and its mirror image", union, bodies=2
     )
+
+
+def _halves() -> Case:
+    """Half a box, open where its mirror image goes on."""
+    half = box(0.05, 0.07, 0.04)
+    sides = [p for p in half.polygons if any(half.corners_m[i, 0] for i in p)]
+    writer = GltfWriter()
+    tree = _tree([_part(writer, in_triangles(replace(half, polygons=tuple(sides))))])
+    tree["nodes"] = [{"mesh": 0}, {"mesh": 0, "scale": [-1, 1, 1]}]
+    tree["scenes"] = [{"nodes": [0, 1]}]
+    data = writer.finish(tree)
+    return Case("glb_halves.glb", data, "an open half and its mirror image", box(0.1, 0.07, 0.04))
 
 
 def _part(writer: GltfWriter, solid: Solid) -> dict[str, object]:

@@ -89,6 +89,8 @@ def _mixed() -> Iterator[Case]:
     yield Case("obj_repeated_corners.obj", repeated, "a corner written twice", BOX)
     doubled = obj(BOX) + b"f 4 3 2 1\n"
     yield Case("obj_repeated_face.obj", doubled, "a face written twice", BOX, recorded="coincident")
+    fortran = obj(BOX, Obj(number="{:.17E}")).replace(b"E-", b"D-").replace(b"E+", b"d+")
+    yield Case("obj_fortran.obj", fortran, "exponents as Fortran writes them", BOX)
     outline = obj(BOX).replace(b"\nf ", b"\nfo ")
     yield Case("obj_outline.obj", outline, "faces by their old name, fo", BOX)
     yield Case("OBJ_UPPER.OBJ", obj(BOX), "suffix in upper case", BOX)
@@ -108,6 +110,11 @@ def _true(solid: Solid) -> tuple[float, float]:
 
 def _refused() -> Iterator[Case]:
     whole = obj(BOX)
+    yield Case(
+        "bad_cut.obj", whole.rstrip()[:-4], "cut within the last face", refused="is truncated"
+    )
+    commas = obj(BOX, Obj(gap=", ")).replace(b"v, ", b"v ").replace(b"f, ", b"f ")
+    yield Case("bad_commas.obj", commas, "commas between numbers", refused="comma")
     comma = obj(BOX, Obj(number="{:.6f}")).replace(b"0.1", b"0,1")
     yield Case("bad_comma.obj", comma, "commas as decimal marks", refused="comma")
     yield Case(

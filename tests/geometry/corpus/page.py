@@ -20,6 +20,23 @@ readers other than ours. `tests/geometry/test_corpus.py` holds every row.
 
 Volume, area and NSVR are what is right; each file is read to these within its tolerance (a
 relative error of volume and of area). A refused file has the sentence that refuses it.
+
+## Why the readers are our own
+
+Measured on these files but for URDF and for those of several bodies (203 that are right, 72 to be
+refused), polygons cut as the library cuts them:
+
+| library | right | wrong in silence | refused | ends the process | takes what it should refuse |
+|-|-|-|-|-|-|
+| trimesh 5.2.0 | 117 of 203 | 36 | 50 | 0 | 34 of 72 |
+| assimp (assimp-py 1.1.0) | 165 of 203 | 10 | 26 | 4 | 27 of 72 |
+| meshio 5.3.5 | 41 of 203 | 13 | 149 | 0 | 6 of 72 |
+| tinyobjloader 2.0.0rc13, OBJ alone | 49 of 55 | 1 | 5 | 0 | 12 of 23 |
+
+The best of them, assimp, holds corners in 32 bits and ends the process on four files. A reader
+that is lenient cannot give a reason, and what it skips is missing without a word. Cutting polygons
+is a library's: manifold3d, which is here for other things, keeps corners that lie in line with
+their neighbours; mapbox-earcut leaves them out, and the neighbouring faces gape.
 """
 
 

@@ -52,6 +52,7 @@ def cases() -> Iterator[Case]:
         yield Case(f"stl_{name}.stl", stl(TRIANGLES, how), what, BOX, recorded=held)
     yield from _corners()
     yield from _several()
+    yield from _lines()
     yield from _refused()
 
 
@@ -96,6 +97,23 @@ def _several() -> Iterator[Case]:
     yield Case("stl_two.stl", both, "two binary files joined to one", union, bodies=2)
 
 
+def _lines() -> Iterator[Case]:
+    """Text broken into lines in other ways, and facets of four corners."""
+    text = stl(TRIANGLES, Stl(text=True)).decode()
+    joined = text.replace("\n  outer", " outer").replace("\n    vertex", " vertex")
+    joined = joined.replace("\n  endloop\n", " endloop ")
+    yield Case("stl_text_facets.stl", joined.encode(), "a facet a line", BOX)
+    coloured = text.replace("facet normal", "color 1 0 0\nfacet normal")
+    yield Case("stl_text_colours.stl", coloured.encode(), "lines with colours", BOX)
+    lines = ["solid four"]
+    for polygon in BOX.polygons:
+        corners = [" ".join(f"{c:.17g}" for c in BOX.corners_m[i]) for i in polygon]
+        lines += ["facet normal 0 0 0", "outer loop", *(f"vertex {at}" for at in corners)]
+        lines += ["endloop", "endfacet"]
+    four = "\n".join([*lines, "endsolid four"])
+    yield Case("stl_text_four.stl", four.encode(), "facets of four corners", BOX)
+
+
 def _refused() -> Iterator[Case]:
     whole, text = stl(TRIANGLES), stl(TRIANGLES, Stl(text=True))
     yield Case("bad_cut.stl", whole[:-30], "cut within a triangle", refused="is truncated")
@@ -110,6 +128,8 @@ def _refused() -> Iterator[Case]:
         "bad_none_text.stl", b"solid empty\nendsolid empty\n", "text without a facet",
         refused="no triangles",
     )  # fmt: skip
+    noise = np.random.default_rng(1).integers(0, 256, 900, dtype=np.uint8).tobytes()
+    yield Case("bad_noise.stl", noise, "bytes of something else", refused="neither a binary nor")
     nan = _CORNERS.copy()
     nan[3, 1, 2] = np.nan
     yield Case("bad_nan.stl", stl_binary(nan), "a corner of NaN", refused="NaN")
