@@ -1,10 +1,18 @@
-"""Order of the tests: what takes minutes begins first, so that cores end together."""
+"""Arrays are checked against their annotations; what takes minutes begins first."""
 
+import os
 from pathlib import Path
 
 import pytest
 
+from tests.checked_shapes import VARIABLE
+
 HERE = Path(__file__).parent
+# Before anything imports pipeline; the programs that tests start, some elsewhere, inherit it.
+os.environ[VARIABLE] = "tests.checked_shapes"
+os.environ["PYTHONPATH"] = os.pathsep.join(
+    [str(HERE.parent), *filter(None, [os.environ.get("PYTHONPATH")])]
+)
 LONGEST = (
     "regression/test_ci_run.py",
     "stages/test_faults.py",

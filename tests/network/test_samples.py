@@ -5,6 +5,7 @@ import pytest
 
 from pipeline.errors import ArtifactError
 from pipeline.network.samples import GraspTensors
+from tests.checked_shapes import unchecked
 from tests.network.planes import planes_with_holes
 
 GOOD = planes_with_holes(8, seed=0)
@@ -25,7 +26,7 @@ def test_quality_outside_its_range_is_refused(bad: float) -> None:
 
 
 def test_shapes_that_disagree_and_empty_splits_are_refused() -> None:
-    with pytest.raises(ArtifactError, match="disagree in shape"):
+    with unchecked(), pytest.raises(ArtifactError, match="disagree in shape"):
         GraspTensors(cloud=GOOD.cloud, mask=GOOD.mask[:4], quality=GOOD.quality)
     with pytest.raises(ArtifactError, match="no samples"):
         GraspTensors(cloud=GOOD.cloud[:0], mask=GOOD.mask[:0], quality=GOOD.quality[:0])
