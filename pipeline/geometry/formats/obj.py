@@ -44,8 +44,24 @@ _CALL = re.compile(rb"^[ \t]*call[ \t]+([^\n]*)", re.MULTILINE)
 def read(label: str, data: bytes, max_faces: int) -> Surface:
     """An OBJ file's faces.
 
-    Raises MeshError where the file is no text, a line is none that OBJ knows, there are no faces
-    or too many, or a face refers to a vertex that is not there.
+    Parameters
+    ----------
+    label
+        The file, for what is said of it.
+    data
+        The whole file.
+    max_faces
+        More are refused before memory is taken for them.
+
+    Returns
+    -------
+    The surface in the file's own unit.
+
+    Raises
+    ------
+    MeshError
+        Where the file is no text, a line is none that OBJ knows, there are no faces or too many,
+        or a face refers to a vertex that is not there.
     """
     text = _joined(without_comments(text_of(label, data)))
     lines = _FACE.findall(text)

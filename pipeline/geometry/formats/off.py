@@ -30,8 +30,24 @@ _VERTEX_BYTES, _FACE_BYTES = 6, 2
 def read(label: str, data: bytes, max_faces: int) -> Surface:
     """An OFF file's faces.
 
-    Raises MeshError where the file is no OFF, is binary, ends before its last face, has no faces
-    or too many, or a face refers to a vertex that is not there.
+    Parameters
+    ----------
+    label
+        The file, for what is said of it.
+    data
+        The whole file.
+    max_faces
+        More are refused before memory is taken for them.
+
+    Returns
+    -------
+    The surface in the file's own unit.
+
+    Raises
+    ------
+    MeshError
+        Where the file is no OFF, is binary, ends before its last face, has no faces or too many,
+        or a face refers to a vertex that is not there.
     """
     if re.match(rb"\s*\S*OFF\s+BINARY", data[:64]):
         raise MeshError(f"{label} is binary OFF, which is not read", "Export it as text OFF or PLY")

@@ -50,8 +50,25 @@ _LAST_DIGITS = (1e-6, 1e-5)
 def read(label: str, data: bytes, max_faces: int) -> Surface:
     """An STL file's triangles, corners welded.
 
-    Raises MeshError where the file is no STL, is truncated, has no triangles or too many, or
-    declares a number of triangles that neither it nor its surface bears out.
+    Parameters
+    ----------
+    label
+        The file, for what is said of it.
+    data
+        The whole file.
+    max_faces
+        More are refused before memory is taken for them.
+
+    Returns
+    -------
+    The surface in the file's own unit, with a note
+    where its count was not believed or corners were welded widely.
+
+    Raises
+    ------
+    MeshError
+        Where the file is no STL, is truncated, has no triangles or too many, or declares a number
+        of triangles that neither it nor its surface bears out.
     """
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         text_of(label, data)  # says that it is UTF-16

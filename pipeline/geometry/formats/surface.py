@@ -28,7 +28,20 @@ class Surface:
 def surface_of(label: str, polygons: Polygons, notes: tuple[str, ...] = ()) -> Surface:
     """The polygons in triangles, over those of their vertices that they use.
 
-    Raises MeshError where vertices that are used are not finite, or a polygon cannot be cut.
+    Parameters
+    ----------
+    label
+        The file, for what is said of it.
+    polygons
+        Faces whose corners are in range.
+    notes
+        What the object's record should say already.
+
+    Raises
+    ------
+    MeshError
+        Where no face has three corners, a vertex that is used is not finite, or a face cannot be
+        cut.
     """
     if not (polygons.counts >= 3).any():
         raise MeshError(f"{label} has no faces of three or more corners", "Export its surface")

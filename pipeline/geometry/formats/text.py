@@ -109,7 +109,21 @@ def _shown(word: bytes) -> str:
 
 
 def plain_triples(text: bytes, keyword: bytes, lines: int) -> list[bytes] | None:
-    """The words behind a keyword where each of so many lines has three of them, else None."""
+    """The words behind a keyword where every line that begins with it has three, quickly.
+
+    Parameters
+    ----------
+    text
+        Lines that end in LF.
+    keyword
+        A pattern of the lines' first word.
+    lines
+        How many lines begin with it.
+
+    Returns
+    -------
+    Three words a line, in order; None where a line has more or fewer.
+    """
     row = rb"^[ \t]*" + keyword + rb"[ \t]+([^ \t\n]+[ \t]+[^ \t\n]+[ \t]+[^ \t\n]+)[ \t]*$"
     found = re.findall(row, text, re.MULTILINE)
     return b" ".join(found).split() if len(found) == lines else None

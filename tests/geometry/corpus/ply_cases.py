@@ -64,6 +64,11 @@ def cases() -> Iterator[Case]:
             f"ply_strips_{form}.ply", ply(strip, Ply(form=form, strips=True)), "triangle strips",
             BOX,
         )  # fmt: skip
+    head, mark, body = ply(NOTCHED, _TEXT).partition(b"end_header\n")
+    stream = head + mark + b" ".join(body.split()) + b"\n"
+    yield Case("ply_text_stream.ply", stream, "text, all rows on one line", NOTCHED)
+    colours = head + mark + body.replace(b"\n", b" 255 0 0\n")
+    yield Case("ply_text_colours.ply", colours, "colours that the header leaves out", NOTCHED)
     yield from _refused()
 
 
