@@ -25,11 +25,11 @@ from pipeline.world.scene import ClutterScene
 from stages.graph import RUNS_DIR
 from stages.grasps import ROUND, label_rounds, pad_of, ray_scene, synthesize, visible_surface
 
-PHASE_GRASPS = 4096
-PROBLEM_GRASPS = 1200  # a scene
-MESH_GRASPS = 2048
-STORED_SAMPLES = 8192
-WORKER_SECONDS = 6.0
+PHASE_GRASPS = 4096  # enough for rates known to a percent
+PROBLEM_GRASPS = 1200  # of one scene: problems of all kinds
+MESH_GRASPS = 2048  # a mesh size: enough for rates known to a percent
+STORED_SAMPLES = 8192  # more than any cache of a disk hides
+WORKER_SECONDS = 6.0  # a number of workers is timed for so long
 
 
 Measure = Callable[[], dict[str, object]]

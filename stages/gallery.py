@@ -23,8 +23,9 @@ from pipeline.world.cameras import PinholeCamera, camera_at
 from pipeline.world.scene import ClutterScene
 from stages.graph import RUNS_DIR
 
+# Pictures of the size that a sheet of nine has room for.
 PORTRAIT = StaticCameraConfig(width_px=560, height_px=420, vertical_fov_rad=0.6, sensor="ideal")
-ELEVATION_RAD, AZIMUTH_RAD = 0.75, -0.9
+ELEVATION_RAD, AZIMUTH_RAD = 0.75, -0.9  # from the side and above, where piles show their height
 MARGIN = 0.92  # of the sphere around the objects, which they never fill
 
 

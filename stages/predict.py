@@ -38,7 +38,7 @@ from pipeline.stopwatch import Stopwatch
 from stages.graph import RUNS_DIR
 
 SECTIONS = ("seed", "predict", "gripper", "sensing", "grasps", "evaluate")
-THREADS = 2
+THREADS = 2  # cores of the smallest machine that is supported
 
 
 @dataclass(frozen=True)

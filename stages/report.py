@@ -20,7 +20,7 @@ from pipeline.reporting.words import headline, mixed_parts, words_on_meshes
 from stages.graph import MADE, RUNS_DIR
 
 GOALS = {"evaluate": "eval"}  # what `make` calls a stage, where it is another word
-FAILURES = 8
+FAILURES = 8  # as many as a page has room for
 FIGURES = "report"  # folder of the pictures, beside the page
 
 

@@ -14,7 +14,7 @@ from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder, run_command
 from stages.graph import MADE, RUNS_DIR
 
-WEB_PORT = 9090
+WEB_PORT = 9090  # the one that Rerun's web viewer takes by itself
 LOCAL = "127.0.0.1"  # the viewer would otherwise listen to the whole network
 
 

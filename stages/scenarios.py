@@ -25,7 +25,7 @@ from pipeline.simulation.scenarios import SCENARIOS, seeing, trials
 from stages.evaluate import network
 from stages.graph import RUNS_DIR
 
-TRIALS = 10
+TRIALS = 10  # scenes a scenario; tables say «of 10»
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ def tried(job: ScenarioJob) -> Row:
     strategy = strategy_of(job.policy, network(job.checkpoint).predict, config)
     # The same scenes for every policy, and for the same things seen otherwise.
     rng = generator(config.seed, "scenario", scenario.name.removesuffix(", segmented"))
-    scenes = trials(scenario, job.trials, rng)
+    scenes = trials(scenario, job.trials, job.config.objects.density_kg_m3, rng)
     causes: Counter[str] = Counter()
     for scene, objects in scenes:
         rng = generator(config.seed, "attempt", scene.scene_id)

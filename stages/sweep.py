@@ -52,8 +52,8 @@ from schemas.softgrip.v1.training_pb2 import SweepBudget, SweepNetwork
 from stages.graph import SWEEP, inputs_of
 from stages.train import SAMPLES
 
-TIMED_BATCH = 64
-TIMED_THREADS = 2
+TIMED_BATCH = 64  # grasps asked at once, as in a control step
+TIMED_THREADS = 2  # cores of the smallest machine that is supported
 NETWORKS, BUDGET = "/networks", "/budget"
 
 

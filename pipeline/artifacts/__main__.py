@@ -9,7 +9,7 @@ import typer
 from pipeline.artifacts.inspection import Contents, contents_of, run_folder, verified
 from pipeline.errors import SoftgripError
 
-EXIT_FAILURE = 1
+EXIT_FAILURE = 1  # what shells read as a failure
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 File = Annotated[Path, typer.Argument(help="an .mcap of a run")]

@@ -23,11 +23,11 @@ MAGIC = b"\x89MCAP0\r\n"
 FOOTER = struct.Struct("<BQQQI")  # opcode, length, summary start, offset start, CRC
 DATA_END = struct.Struct("<BQI")  # opcode, length, CRC
 CHUNK_HEAD = struct.Struct("<BQQQQII")  # opcode, length, times, size, CRC, length of the next name
-RECORD_HEAD_BYTES = 9
-CRC_BYTES = 4
+RECORD_HEAD_BYTES = 9  # MCAP: a byte of kind, eight of length
+CRC_BYTES = 4  # MCAP writes CRC-32 everywhere
 FRAME_HEAD_BYTES = 32  # more than the header of a zstd or lz4 frame
-SMALL_READ_BYTES = 1 << 16
-BLOCK_BYTES = 1 << 20
+SMALL_READ_BYTES = 1 << 16  # holds an MCAP summary of our files whole
+BLOCK_BYTES = 1 << 20  # read at once: bounds the memory of a check
 
 REMEDY = "Delete it and run the same command again"
 

@@ -19,7 +19,7 @@ from pathlib import Path
 
 from pipeline.errors import ArtifactError
 
-HASH_BLOCK_BYTES = 1 << 20
+HASH_BLOCK_BYTES = 1 << 20  # hashed at once: bounds the memory of a digest
 FULL = (errno.ENOSPC, errno.EDQUOT)
 FORBIDDEN = (errno.EACCES, errno.EPERM, errno.EROFS)
 CANNOT_WRITE = FULL + FORBIDDEN

@@ -11,7 +11,7 @@ from pipeline.errors import ArtifactError, ContentError
 from schemas.softgrip.v1.tensor_pb2 import Tensor
 
 DTYPES = ("b1", "u1", "u2", "u4", "u8", "i1", "i2", "i4", "i8", "f2", "f4", "f8")
-MOST_SIDES = 8
+MOST_SIDES = 8  # twice as many as any tensor of ours has
 LONGEST_SIDE = 2**40  # even of an empty array
 
 

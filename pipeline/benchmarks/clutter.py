@@ -12,7 +12,7 @@ from pipeline.errors import SceneError
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.shape import ShapeClass
 
-PILES = 5
+PILES = 5  # enough for a median, in seconds
 
 
 def figures(objects: Iterable[CatalogueObject], config: ScenesConfig) -> dict[str, object]:

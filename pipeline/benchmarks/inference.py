@@ -9,10 +9,10 @@ from pipeline.network.ga_cnn import GaCnn, build_network
 from pipeline.network.samples import Samples
 from pipeline.network.timing import runtimes_ms_a_grasp
 
-THREADS = 2
+THREADS = 2  # cores of the smallest machine that is supported
 SECONDS = 3.0  # a batch size: the machine's own hiccups are shorter
-CLOUDS = 512
-_CHECKED_BATCH = 64
+CLOUDS = 512  # the largest batch that is timed
+_CHECKED_BATCH = 64  # enough clouds to tell a wrong export
 
 
 def sized_network(config: NetworkConfig, grid_cells: int) -> tuple[GaCnn, ControlPredictor]:

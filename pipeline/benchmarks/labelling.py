@@ -30,9 +30,9 @@ from pipeline.world.raycasting import RayScene
 from pipeline.world.scene import ClutterScene
 from pipeline.world.view import CameraView
 
-ROUND = 512
-LATENCY_GRASPS = 1000
-_BUMPS = 8
+ROUND = 512  # as stage grasps labels them
+LATENCY_GRASPS = 1000  # enough for a 95th percentile
+_BUMPS = 8  # a surface neither flat nor hopeless
 
 
 Labelled = list[tuple[GraspOrigin, LabelledGrasps]]

@@ -19,8 +19,8 @@ from pipeline.messages.samples import STORED_AS
 from pipeline.network.loading import epoch_batches, load_batches
 from pipeline.network.samples import GraspTensors, Samples
 
-SHARDS = 4
-REPEATS, EPOCHS = 5, 30
+SHARDS = 4  # enough that readers work side by side
+REPEATS, EPOCHS = 5, 30  # enough for a median, in seconds
 PEERS = ("hdf5", "zarr", "webdataset")
 
 

@@ -15,7 +15,7 @@ from pipeline.labelling.heights import pad_heights
 from pipeline.labelling.sampling import Candidates
 from pipeline.world.raycasting import RayScene
 
-ROUND = 512
+ROUND = 512  # as stage grasps labels them
 
 
 PROBLEMS: dict[SolverName, int] = {"structured": 2000, "piqp-sparse": 200, "piqp-dense": 12}

@@ -20,8 +20,9 @@ from pipeline.messages.samples import STORED_AS, sample_batch, samples_of
 from pipeline.network.samples import Samples
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 
-BATCH = 256
-REPEATS = 5
+BATCH = 256  # samples a message, as grasps.samples_per_message
+REPEATS = 5  # enough for a median, in seconds
+# Of a file that is deleted after it is timed.
 PROVENANCE = Provenance("bench", "0" * 64, "0" * 64, "0" * 64, 0, (), "bench")
 
 Write = Callable[[Path, list[Samples]], None]

@@ -10,7 +10,7 @@ from pipeline.geometry.transforms import invert, transform_points
 from pipeline.world.cameras import PinholeCamera
 
 SPLAT_PX_A_POINT = 1.3  # pixels a point of a cloud at the mean distance should cover
-LARGEST_PX = 1024
+LARGEST_PX = 1024  # no depth camera has more pixels a side
 
 
 @dataclass(frozen=True, eq=False)

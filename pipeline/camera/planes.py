@@ -15,7 +15,7 @@ from sklearn.linear_model import RANSACRegressor
 
 FITTED_POINTS = 6000  # of all points, at random: enough for planes that matter, and fast
 TRIALS = 1000  # finds a plane of a seventh of what is left in 19 of 20 cases
-FEWEST_INLIERS = 60
+FEWEST_INLIERS = 60  # fewer lie on a plane by chance
 
 
 @dataclass(frozen=True, eq=False)

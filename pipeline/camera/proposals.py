@@ -24,7 +24,7 @@ from pipeline.geometry.transforms import frame_from_z, invert, transform_points
 from pipeline.world.cameras import points_of_depth
 
 EVERY_PX = 2  # every second pixel a side is enough to find planes
-WORLD_UP = np.array([0.0, 0.0, 1.0])
+WORLD_UP = np.array([0.0, 0.0, 1.0])  # of a world whose z is up
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,8 +14,8 @@ from pipeline.physics.engine import Body, add_body, add_wall, new_world, sapien_
 from pipeline.physics.settling import settle
 
 _CLEARANCE_M = 0.005  # above what is below, when let go
-_TRIES_ALONE = 8
-_WALL_M = 0.02
+_TRIES_ALONE = 8  # poses of a last object that found no room in the column
+_WALL_M = 0.02  # thick enough that no body passes through in one step
 # The column that a pile is dropped into is this much wider than its longest object.
 _COLUMN_WIDTH = 1.5
 _INVISIBLE = (0.5, 0.5, 0.5)

@@ -13,7 +13,7 @@ class Distribution(StrEnum):
     STACKED = "stacked"
 
 
-LEVELS = range(1, 10)
+LEVELS = range(1, 10)  # Table II numbers them so
 
 
 def level_of(level: int) -> tuple[ShapeClass, Distribution]:

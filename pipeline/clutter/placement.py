@@ -14,9 +14,9 @@ from pipeline.clutter.gaps import Box, Surface, bounds_of, box_distance_m, gap_m
 from pipeline.config.scenes import ScenesConfig
 from pipeline.errors import SceneError
 
-_DARTS_PER_OBJECT = 400
-_SLIDES_PER_OBJECT = 40
-_STEPS_PER_SLIDE = 200
+_DARTS_PER_OBJECT = 400  # random places tried; a table that is full needs most of them
+_SLIDES_PER_OBJECT = 40  # directions from which an object is slid to its neighbour
+_STEPS_PER_SLIDE = 200  # bisection ends long before: this bounds a slide that does not
 # Objects settle by some tenths of a millimetre after placement: keep this far inside the bounds.
 _MARGIN_M = 0.001
 # A slide has arrived when its gap is this near to the one wanted.

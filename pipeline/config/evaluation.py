@@ -42,6 +42,7 @@ class HandConfig(ScaledSection):
     camera_above_m: ClassVar[LengthInMetres] = LengthInMetres()
     camera_focus_m: ClassVar[LengthInMetres] = LengthInMetres()
     margin_m: ClassVar[LengthInMetres] = LengthInMetres()
+    home_m: ClassVar[LengthInMetres] = LengthInMetres()
 
     length_rg: float = Field(8.0, gt=2.0, le=40.0, description="pad to flange [r_G]")
     stem_radius_rg: float = Field(
@@ -59,6 +60,11 @@ class HandConfig(ScaledSection):
     )
     margin_rg: float = Field(
         0.16, ge=0, description="hand and stem keep this far from what was measured [r_G]"
+    )
+    home_rg: float = Field(24.0, gt=0, description="height at which a floating gripper waits [r_G]")
+    friction: float = Field(0.3, ge=0, le=2, description="of stem and hand against objects [1]")
+    touch_n: float = Field(
+        2.0, ge=0, description="what the pad's spring pushes with when it touches [N]"
     )
     camera_radius_m: float = Field(
         0.031,
@@ -83,6 +89,10 @@ class ArmConfig(Section):
     home_m: tuple[float, float, float] = Field(
         (-0.15, 0.0, 0.45), description="where the pad waits, pointing down [m]"
     )
+    margin_m: float = Field(
+        0.01, ge=0, description="links, hand and table keep this far from each other [m]"
+    )
+    hand_mass_kg: float = Field(0.6, gt=0, description="of the gripper at the flange [kg]")
 
 
 class EvaluateConfig(Section):
@@ -94,6 +104,9 @@ class EvaluateConfig(Section):
     )
     policies: tuple[PolicyName, ...] = Field(
         ("closed-loop", "open-loop", "geometric"), min_length=1, description="the first is judged"
+    )
+    settle_s: float = Field(
+        1.5, ge=0, description="time that a clutter comes to rest before the first attempt [s]"
     )
     attempts_per_clutter: int = Field(
         15, ge=1, description="attempts before a clutter is given up as not cleared"

@@ -39,7 +39,7 @@ class Candidates:
         return Candidates(self.world_from_contact[chosen], self.roughness_m[chosen])
 
 
-_NONE = Candidates(np.empty((0, 4, 4)), np.empty(0))
+_NONE = Candidates(np.empty((0, 4, 4)), np.empty(0))  # no candidate at all
 
 
 def sample_candidates(

@@ -9,7 +9,7 @@ from loguru import logger
 
 from pipeline.errors import SoftgripError
 
-EXIT_FAILURE = 1
+EXIT_FAILURE = 1  # what shells read as a failure
 
 
 def run_command(command: Callable[..., None] | typer.Typer) -> None:

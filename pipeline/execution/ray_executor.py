@@ -17,8 +17,8 @@ from pipeline.errors import MachineError, SoftgripError
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-MOST_RETRIES = 5
-AHEAD_PER_CPU = 2
+MOST_RETRIES = 5  # of an item whose node died: nodes that die so often are no cluster
+AHEAD_PER_CPU = 2  # items in flight, so that a slow driver bounds memory
 
 
 def run_on_ray(job: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:

@@ -19,7 +19,7 @@ from pipeline.execution.code import ROOT
 
 EMBREE = "Embree rays"
 TRIAL = "pipeline.physics.render_trial"
-TRIAL_TIMEOUT_S = 120.0
+TRIAL_TIMEOUT_S = 120.0  # a first start compiles shaders; a driver that hangs takes no longer
 DEVICES = ("nvidia[0-9]*", "dri/renderD*")
 CHOICES = ("VK_ICD_FILENAMES", "VK_DRIVER_FILES")
 

@@ -38,7 +38,7 @@ Draw = Callable[[StageContext, Summary], None]
 
 CLOCK_TICK_S = 0.01  # what processor time is counted in
 
-EXIT_INTERRUPTED = 130
+EXIT_INTERRUPTED = 130  # what shells read as ended by SIGINT
 
 
 def stage_command(

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-FLANGE_M = 0.126
-_CLEAR_M, _FOOT_M = 0.01, 0.12
+FLANGE_M = 0.126  # from joint A6 to the flange; KUKA data sheet
+_CLEAR_M, _FOOT_M = 0.01, 0.12  # cylinders of links end short of each other; height of the foot
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,8 @@ class Axis:
     radius_m: float
 
 
-_QUARTER = math.pi / 2
+_QUARTER = math.pi / 2  # joints of the arm stand at right angles
+# Lengths, limits, torques and masses of KUKA's data sheet.
 AXES = (
     Axis(0.36, -_QUARTER, math.radians(170), 320, math.radians(85), 3.94781, 0.07),
     Axis(0.00, _QUARTER, math.radians(120), 320, math.radians(85), 4.50275, 0.09),

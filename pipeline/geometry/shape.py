@@ -10,8 +10,8 @@ from jaxtyping import Float
 from pipeline.geometry import topology
 from pipeline.geometry.mesh import Mesh
 
-TYPICAL_FROM = 2.6
-COMPLEX_FROM = 3.5
+TYPICAL_FROM = 2.6  # Supplement V: basic below, typical from here
+COMPLEX_FROM = 3.5  # Supplement V: complex from here on
 
 
 class ShapeClass(StrEnum):

@@ -13,8 +13,8 @@ from pathlib import Path
 from pipeline.machine import vulkan_driver
 
 ROOT = Path(__file__).resolve().parents[2]
-OLDEST_PYTHON = (3, 11)
-FREE_GIB_WANTED = 5
+OLDEST_PYTHON = (3, 11)  # the oldest that pyproject.toml allows
+FREE_GIB_WANTED = 5  # environment, caches and a run of paper
 RENDER_TRIAL = """
 from pipeline.config import ScenesConfig, StaticCameraConfig
 from pipeline.world.cameras import static_cameras
@@ -23,7 +23,7 @@ from pipeline.sensing.sapien_rendering import rendered_table
 seen = rendered_table(ScenesConfig(), static_cameras(StaticCameraConfig())[0])
 raise SystemExit(0 if (seen.depth_m > 0).any() else "the table is not in the picture")
 """
-TRIAL_TIMEOUT_S = 120
+TRIAL_TIMEOUT_S = 120  # a first picture compiles shaders; a driver that hangs takes no longer
 
 
 @dataclass(frozen=True)

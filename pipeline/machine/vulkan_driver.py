@@ -14,10 +14,10 @@ import sys
 from pathlib import Path
 
 PACKAGE = "mesa-vulkan-drivers"
-OLDEST_MESA = (24, 3)
+OLDEST_MESA = (24, 3)  # the first whose lavapipe SAPIEN can render with
 ICD_FOLDERS = (Path("/usr/share/vulkan/icd.d"), Path("/etc/vulkan/icd.d"))
 APT_SOURCES = Path("/etc/apt/sources.list.d")
-APT_TIMEOUT_S = 600
+APT_TIMEOUT_S = 600  # a slow mirror needs minutes, a dead one for ever
 
 
 def has_gpu() -> bool:

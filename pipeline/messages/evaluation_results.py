@@ -9,7 +9,7 @@ from pipeline.control.success import Outcome, advantage, success_rate
 from pipeline.world.scene import ClutterScene
 from schemas.softgrip.v1.evaluation_pb2 import Attempt, Comparison, LevelResult
 
-ALL_LEVELS = 0
+ALL_LEVELS = 0  # stands for all levels together in a message
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from pipeline.world.view import CameraView
 from schemas.softgrip.v1 import scenes_pb2
 
 TOPIC = "/scenes"
-NS_PER_SCENE = 1_000_000_000
+NS_PER_SCENE = 1_000_000_000  # a second of log time a scene, so that viewers step through them
 
 # Name of an image → (encoding of foxglove.RawImage, dtype).
 IMAGES = {

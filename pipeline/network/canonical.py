@@ -47,7 +47,7 @@ CONTACT_GAP = 0.02
 # The reference height is taken over the middle third of the grid.
 REFERENCE_PART = 3
 
-SYMMETRIES = 8
+SYMMETRIES = 8  # of a square: four turns, mirrored or not
 
 
 def network_input(

@@ -19,7 +19,7 @@ FORMAT = "softgrip.ga-cnn"
 # Rises whenever an older reader would misread the weights or the input's channels.
 FORMAT_VERSION = 1
 
-_HEADER_LENGTH_BYTES = 8
+_HEADER_LENGTH_BYTES = 8  # safetensors: a little-endian u64 comes first
 _DIGEST_KEY = "sha256"
 _REMEDY = "Train the network again, or pass a checkpoint that this version wrote."
 

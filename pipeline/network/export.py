@@ -20,7 +20,7 @@ from pipeline.network.canonical import KNOWN_CHANNELS, Channels
 from pipeline.network.ga_cnn import GaCnn
 
 FORMAT = "softgrip.ga-cnn.onnx"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 1  # rises where an older reader would misread an export
 REMEDY = "Export the network again."
 
 _INPUT, _OUTPUT = "inputs", "quality"

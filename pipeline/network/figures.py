@@ -7,7 +7,7 @@ from jaxtyping import Float, Int, Num
 
 from pipeline.errors import ArtifactError
 
-BINS = 10
+BINS = 10  # of q in a histogram: tenths
 
 
 @dataclass(frozen=True)

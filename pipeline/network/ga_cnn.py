@@ -40,11 +40,11 @@ from pipeline.config.learning import NetworkConfig
 from pipeline.errors import ConfigError
 from pipeline.network.canonical import CHANNELS, Channels
 
-SHALLOWEST = 18
-DEEPEST = 102
-STEM_LAYERS = 2
-LAYERS_PER_BLOCK = 2
-HEAD_LAYERS = 2
+SHALLOWEST = 18  # Supplement IV: depths from 18 to 102 layers
+DEEPEST = 102  # Supplement IV: depths from 18 to 102 layers
+STEM_LAYERS = 2  # Supplement IV: a 2-layer CNN of 3x3 comes first
+LAYERS_PER_BLOCK = 2  # of a residual block, as depths are counted
+HEAD_LAYERS = 2  # fully connected layers after the last stage
 
 # Blocks beyond an even share go to the stages of middle resolution first: the first stage is the
 # costliest a block, the last the one with most parameters a block.

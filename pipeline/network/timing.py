@@ -14,9 +14,9 @@ Predict = Callable[
     [Float[np.ndarray, "n h w 3"], Bool[np.ndarray, "n h w"]], Float[np.ndarray, " n"]
 ]
 
-BATCHES = (1, 64, 512)
-_SECONDS = 0.2
-_FEWEST_CALLS = 3
+BATCHES = (1, 64, 512)  # one grasp, a control step, and a bulk
+_SECONDS = 0.2  # a batch size is timed for so long at least
+_FEWEST_CALLS = 3  # so that a median has a meaning
 
 
 def milliseconds_a_grasp(

@@ -11,8 +11,8 @@ from jaxtyping import Float, Int, Integer
 
 from pipeline.geometry.mesh import Mesh
 
-_TABLE_COLOUR = (0.52, 0.51, 0.49, 1.0)
-_GOLDEN_RATIO = 0.618033988749895
+_TABLE_COLOUR = (0.52, 0.51, 0.49, 1.0)  # a grey that no object has
+_GOLDEN_RATIO = 0.618033988749895  # steps of hue that never come near each other soon
 # Edges sharper than this stay edges; flatter ones are shaded smooth.
 _CREASE_COSINE = float(np.cos(np.radians(35.0)))
 

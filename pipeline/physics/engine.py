@@ -18,11 +18,11 @@ from pipeline.geometry.transforms import pose_from, position_quaternion
 from pipeline.physics import appearance
 from pipeline.physics.vulkan import new_render_system
 
-TABLE_BODY_ID = 0
+TABLE_BODY_ID = 0  # segmentation holds 0 where no object is
 """Segmentation id of the table and of everything else that is not an object."""
 
-_TABLE_THICKNESS_M = 0.2
-_GRAVITY_M_S2 = (0.0, 0.0, -9.81)
+_TABLE_THICKNESS_M = 0.2  # thick enough that no body passes through in one step
+_GRAVITY_M_S2 = (0.0, 0.0, -9.81)  # standard gravity to three digits
 # PhysX pulls shapes together to the rest offset, so 0 leaves no visible slit; contacts are made
 # from the contact offset on, far under the 10 mm default that suits room-sized scenes.
 _REST_OFFSET_M = 0.0

@@ -12,7 +12,7 @@ from pipeline.artifacts.publishing import file_sha256
 from pipeline.errors import MachineError
 from pipeline.physics.vulkan import MANIFEST_FOLDERS, new_render_system
 
-DIGEST_LENGTH = 12
+DIGEST_LENGTH = 12  # hexadecimal digits that tell two drivers apart
 
 
 def tried_renderer() -> str:

@@ -42,7 +42,7 @@ from schemas.softgrip.v1.evaluation_pb2 import Attempt, Comparison, DepthPicture
 
 TIMELINE = "frame"
 SHOWN_CANDIDATES = 60  # the best of them: more hide the scene
-APPROACH_M = 0.025
+APPROACH_M = 0.025  # length of the arrows that candidates are drawn as
 CAMERAS = ("static_0", "wrist")
 STATES = ("observe", "pregrasp", "approach", "seal", "lift", "shake", "done")
 

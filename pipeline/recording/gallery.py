@@ -8,9 +8,10 @@ from PIL import Image, ImageDraw, ImageFont
 
 from pipeline.clutter.levels import level_of
 
-_LEVELS = ((1, 2, 3), (4, 5, 6), (7, 8, 9))
-_TITLE_PX = 34
-_GAP_PX = 10
+_LEVELS = ((1, 2, 3), (4, 5, 6), (7, 8, 9))  # classes down, distributions across, as in Table II
+_TITLE_PX = 34  # room for one line above a picture
+_GAP_PX = 10  # white between two pictures
+# White paper, dark ink, and a level that is missing.
 _PAPER, _INK, _PALE = (255, 255, 255), (25, 25, 25), (235, 235, 235)
 
 

@@ -28,7 +28,7 @@ VIEW = f"Pad by p w_j (dark 0, yellow {FULL_PRESSURE}; red: lifted), wrench, clo
 LIFTED = colours.PALETTE[5]
 LIFT_M = 3e-4  # the pad is drawn so far above what it lies on, as that is drawn simplified
 ARROW_M = 0.04  # a full seal's force is drawn this long
-ARROW_Z = (235, 235, 235)
+ARROW_Z = (235, 235, 235)  # the axis of the gripper is drawn pale
 LOADS = ("F_x", "F_y", "F_z", "T_z")
 NEAR_M = 0.12  # other objects are drawn when this near
 

@@ -24,7 +24,7 @@ from pipeline.recording.shapes import shown_facets, shown_mesh
 from pipeline.spread import spread
 
 TIMELINE = "object"
-SPACING_M = 0.22
+SPACING_M = 0.22  # between two objects on the sheet: a third more than the longest
 
 
 def draw_objects(stage: MadeStage, figures: Mapping[str, Any]) -> None:

@@ -12,8 +12,10 @@ from pipeline.camera.proposals import pixels_of
 from pipeline.recording import colours
 
 WIDTH_PX = 960  # of the picture on the sheet; smaller ones are enlarged
+# White around the picture, room for the scale and two lines.
 _MARGIN_PX, _SCALE_PX, _TITLE_PX = 14, 120, 64
 _RIM = 48  # points of a pad's outline
+# White paper, dark ink, and what is less important.
 _PAPER, _INK, _PALE = (255, 255, 255), (25, 25, 25), (150, 150, 150)
 
 

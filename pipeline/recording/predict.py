@@ -14,9 +14,9 @@ from pipeline.recording.shapes import shown_pose
 from pipeline.world.cameras import points_of_depth
 
 TIMELINE = "grasp"
-CLOUD_EVERY = 2
-FRUSTUM_M = 0.1
-_RIM = 48
+CLOUD_EVERY = 2  # every second pixel a side: a quarter of the points
+FRUSTUM_M = 0.1  # a camera is drawn this long
+_RIM = 48  # points of a pad's outline
 
 
 def blueprint(prediction: Prediction) -> rrb.Blueprint:

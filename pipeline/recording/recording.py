@@ -35,7 +35,7 @@ from pipeline.config import RunConfig
 from pipeline.stopwatch import Stopwatch
 
 APPLICATION = "softgrip"
-NO_ROOM_BYTES = 1 << 20
+NO_ROOM_BYTES = 1 << 20  # less free space is a full disk
 LARGEST_MB = 200  # what a viewer still opens in seconds; [recording] of run.toml keeps below it
 ROOTS = ("world", "camera", "curves", "notes")
 TIMELINES = {

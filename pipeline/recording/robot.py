@@ -11,7 +11,7 @@ from pipeline.geometry.iiwa14 import LINKS, LinkShape, link_poses
 from pipeline.recording import colours
 
 GRIPPER, ARM = "world/gripper", "world/arm"
-_PAD_M = 0.004  # thickness
+_PAD_M = 0.004  # the pad is drawn this thick
 
 
 @dataclass(frozen=True)

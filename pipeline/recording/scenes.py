@@ -27,7 +27,7 @@ from pipeline.world.scene import ClutterScene
 from pipeline.world.view import CameraView
 
 TIMELINE = "scene"
-FRUSTUM_M = 0.15
+FRUSTUM_M = 0.15  # a camera is drawn this long
 CLOUD_EVERY = 3  # every third pixel a side: a ninth of the points
 
 

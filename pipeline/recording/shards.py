@@ -15,9 +15,9 @@ from pipeline.recording.recording import MadeStage, looking, recording, time_pan
 from pipeline.spread import spread
 
 TIMELINE = "sample"
-SHEET_COLUMNS = 10
+SHEET_COLUMNS = 10  # clouds in a row of the sheet
 SHEET_SPACING = 3.0  # in r_G: clouds are 2.4 wide
-CELL_RADIUS = 0.04
+CELL_RADIUS = 0.04  # a cell is drawn as a ball of this size, in r_G
 
 
 def draw_shards(stage: MadeStage, figures: Mapping[str, Any]) -> None:

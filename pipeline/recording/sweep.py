@@ -16,7 +16,7 @@ from pipeline.recording.recording import MadeStage, name_curve, recording, step,
 from schemas.softgrip.v1.training_pb2 import SweepBudget, SweepNetwork
 
 TIMELINE = "layers"
-_CHOSEN_COLOUR = (60, 200, 90)
+_CHOSEN_COLOUR = (60, 200, 90)  # green, as Fig. 1 marks the chosen network
 
 
 def draw_sweep(stage: MadeStage, figures: Mapping[str, Any]) -> None:

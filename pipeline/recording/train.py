@@ -25,10 +25,10 @@ from pipeline.recording.recording import (
 from schemas.softgrip.v1.training_pb2 import Epoch, TrainingResult
 
 TIMELINE = "epoch"
-SHEET_COLUMNS = 6
-SHEET_SAMPLES = 24
+SHEET_COLUMNS = 6  # clouds in a row of the sheet
+SHEET_SAMPLES = 24  # as many as can be looked at one by one
 SHEET_SPACING = 3.0  # in r_G: clouds are 2.4 wide
-SCATTER_POINTS = 5000
+SCATTER_POINTS = 5000  # more hide each other in the plot
 
 
 def draw_train(stage: MadeStage, figures: Mapping[str, Any]) -> None:

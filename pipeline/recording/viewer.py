@@ -21,9 +21,9 @@ from pipeline.physics.vulkan import choose_vulkan_driver
 
 LOCAL = "127.0.0.1"  # the viewer would otherwise listen to the whole network
 
-_PATIENCE_S = 60.0
-_START_PAUSE_S = 0.1
-_PAUSE_S = 0.5
+_PATIENCE_S = 60.0  # a viewer that takes longer to open a file hangs
+_START_PAUSE_S = 0.1  # between two looks for its address
+_PAUSE_S = 0.5  # between two tries at a picture
 _TRIES = 3  # beyond the first; the viewer gives up on a picture after some seconds
 
 

@@ -17,9 +17,9 @@ from pipeline.referee.load import Hold, contact_wrenches, suction_wrench, weight
 from pipeline.referee.pump import Fan
 from pipeline.referee.surface import Surface
 
-GRAVITY_M_S2 = 9.81
+GRAVITY_M_S2 = 9.81  # standard gravity to three digits
 DRAWN_IN = 0.01  # the pad rests when the vacuum pulls as hard as it is pressed, to this share
-MOST_DRAWS = 8
+MOST_DRAWS = 8  # a pad settles in two or three
 Way = Literal["compiled", "plain"]
 
 

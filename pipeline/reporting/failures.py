@@ -24,10 +24,12 @@ from pipeline.world.scene import PlacedObject
 from schemas.softgrip.v1.evaluation_pb2 import Attempt
 from schemas.softgrip.v1.scenes_pb2 import Scene
 
+# A picture of the size that a page has room for.
 CAMERA = StaticCameraConfig(width_px=400, height_px=300, vertical_fov_rad=0.7, sensor="ideal")
+# From where an object and its neighbours fill the picture.
 DISTANCE_M, ELEVATION_RAD, AZIMUTH_RAD = 0.5, 0.75, -0.9
 PAD = "pad"
-PAD_THICKNESS_M = 0.006
+PAD_THICKNESS_M = 0.006  # the pad is drawn this thick
 
 
 def failures_of(

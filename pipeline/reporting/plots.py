@@ -32,7 +32,7 @@ STYLE = {
     "grid.color": "0.9",
     "legend.frameon": False,
 }
-WIDTH_IN = 6.4
+WIDTH_IN = 6.4  # of a column of text on the page
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,9 @@ from pipeline.world.scene import PlacedObject
 from pipeline.world.table import table_mesh
 from pipeline.world.view import CameraView, normal_map
 
-_TABLE_COLOUR = (0.5, 0.5, 0.48)
+_TABLE_COLOUR = (0.5, 0.5, 0.48)  # a grey that no object has
 _LIGHT = np.array([-0.32, -0.39, 0.86])  # towards the light
-_AMBIENT, _DIFFUSE = 0.35, 0.65
+_AMBIENT, _DIFFUSE = 0.35, 0.65  # shares of light from everywhere and from the lamp
 
 
 class RayRenderer:

@@ -14,7 +14,7 @@ from pipeline.world.cameras import PinholeCamera
 from pipeline.world.scene import PlacedObject
 from pipeline.world.view import CameraView, normal_map
 
-_NEAR_M, _FAR_M = 0.05, 10.0
+_NEAR_M, _FAR_M = 0.05, 10.0  # clipping planes, beyond all that a scene holds
 # SAPIEN's camera looks along +x with y left and z up; CCS looks along +z with x right, y down.
 _CAMERA_FROM_SAPIEN = np.array(
     [[0.0, -1.0, 0.0, 0.0], [0.0, 0.0, -1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]]

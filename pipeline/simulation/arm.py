@@ -26,10 +26,11 @@ from pipeline.simulation.iiwa14 import GRIPPER_LINK, urdf
 _STIFFNESS, _DAMPING = 4e4, 4e3  # of the joints' position drives [N m/rad, N m s/rad]
 _SPEEDS = np.array([axis.speed_rad_s for axis in AXES])
 _MARGIN_RAD = 0.01  # kept from the ends of the joints' ranges
+# A posture far from every limit, from which inverse kinematics starts.
 _ELBOW_UP = np.array([0.0, 0.5, 0.0, -1.4, 0.0, 1.2, 0.0])
-_SEEDS = 12
-_HEADINGS = 8
-_ITERATIONS = 150
+_SEEDS = 12  # further postures to start from: more find nothing new
+_HEADINGS = 8  # turns of the round pad about its axis that are tried
+_ITERATIONS = 150  # of inverse kinematics; those that converge do so in thirty
 _GIVES_RAD = (0.1, 0.3, 0.6)  # of the elbow, where a joint is at its end
 _BY_ITSELF = [1, 1, 1, 0]  # shapes that share a bit of the third group do not collide
 
@@ -44,7 +45,7 @@ class ArmMover:
         self._timestep_s = world.timestep
         self._base = np.eye(4)
         self._base[:3, 3] = arm.base_m
-        self._articulation = _loaded(world, hand)
+        self._articulation = _loaded(world, hand, arm.hand_mass_kg)
         self._articulation.root_pose = sapien_pose(self._base)
         links = self._articulation.links
         self._own = {link.entity.per_scene_id for link in links}
@@ -58,7 +59,7 @@ class ArmMover:
         for joint, axis in zip(self._joints, AXES, strict=True):
             joint.set_drive_properties(_STIFFNESS, _DAMPING, force_limit=axis.torque_nm)
         self._model = self._articulation.create_pinocchio_model()
-        self._clearance = ArmClearance(hand, pad_radius_m, arm.base_m[2])
+        self._clearance = ArmClearance(hand, pad_radius_m, arm.base_m[2], arm.margin_m)
         rng = np.random.default_rng(0)
         self._seeds = [_ELBOW_UP, *(rng.uniform(-0.8, 0.8, 7) * LIMITS_RAD for _ in range(_SEEDS))]
         self._home_rad = self._most_comfortable(arm)
@@ -176,10 +177,12 @@ class ArmMover:
             joint.set_drive_velocity_target(rate)
 
 
-def _loaded(world: sapien.Scene, hand: HandConfig) -> sapien.physx.PhysxArticulation:
+def _loaded(
+    world: sapien.Scene, hand: HandConfig, hand_mass_kg: float
+) -> sapien.physx.PhysxArticulation:
     loader = world.create_urdf_loader()
     loader.fix_root_link = True
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "iiwa14.urdf"
-        path.write_text(urdf(hand))
+        path.write_text(urdf(hand, hand_mass_kg))
         return loader.load(str(path))

@@ -17,9 +17,8 @@ from pipeline.geometry.iiwa14 import FLANGE_M, LINKS, LinkShape, link_poses
 from pipeline.simulation.iiwa14 import flange_from_gripper, stem_shape
 
 TABLE = "table"
-MARGIN_M = 0.01
 _NEAR = 2  # links this near along the chain share a joint
-_LAST = len(LINKS) - 1
+_LAST = len(LINKS) - 1  # the link at the flange
 _HAND = len(LINKS)  # place of the hand in the chain
 _OFF_THE_TABLE = ("base", "link1", "pad")  # stands on it, or turns upright in place, or is soft
 
@@ -39,7 +38,7 @@ class ArmClearance:
     """The arm's shapes, each grown so that ``margin_m`` is kept between two, and to the table."""
 
     def __init__(
-        self, hand: HandConfig, pad_radius_m: float, base_z_m: float, margin_m: float = MARGIN_M
+        self, hand: HandConfig, pad_radius_m: float, base_z_m: float, margin_m: float
     ) -> None:
         """Parameters
         ----------

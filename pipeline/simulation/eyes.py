@@ -16,7 +16,7 @@ from pipeline.sensing.depth_by_rays import measured, window_around
 from pipeline.world.cameras import PinholeCamera, camera_at, static_cameras
 from pipeline.world.posed_bodies import PosedBodies
 
-_ORIGIN = np.zeros(3)
+_ORIGIN = np.zeros(3)  # a camera that is moved anyway
 
 
 class SimulatedEyes:

@@ -9,9 +9,8 @@ from jaxtyping import Float
 from pipeline.config.evaluation import HandConfig
 from pipeline.geometry.compiled_poses import quaternion_of
 
-HOME = np.array([[1.0, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0.6], [0, 0, 0, 1]])
 """Where the pad waits: upright above the table's middle."""
-STEM_FRICTION = 0.3
+# SAPIEN's capsules lie along x.
 _Z_FROM_X = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 
 
@@ -48,11 +47,12 @@ class FloatingMover:
 
     def __init__(self, world: sapien.Scene, hand: HandConfig, table_side_m: float) -> None:
         self._half_m = table_side_m / 2
+        self._home_m = hand.home_m
         self._radius_m = hand.stem_radius_m
         self._begins_m = hand.stem_begins_m
         self._half_length_m = (hand.length_m - self._begins_m - 2 * hand.stem_radius_m) / 2
         self._rigid = sapien.physx.PhysxRigidDynamicComponent()
-        material = sapien.physx.PhysxMaterial(STEM_FRICTION, STEM_FRICTION, 0.0)
+        material = sapien.physx.PhysxMaterial(hand.friction, hand.friction, 0.0)
         self._rigid.attach(
             sapien.physx.PhysxCollisionShapeCapsule(
                 hand.stem_radius_m, max(self._half_length_m, 1e-3), material
@@ -67,7 +67,8 @@ class FloatingMover:
 
     def reset(self) -> None:
         """Home, at once."""
-        self._pose = HOME.copy()
+        self._pose = np.eye(4)
+        self._pose[2, 3] = self._home_m
         self._entity.pose = self._stem_pose()
 
     def drive(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> bool:

@@ -24,8 +24,7 @@ from pipeline.simulation.suction import Holding, holding
 from pipeline.simulation.suction_joint import SuctionJoint
 from pipeline.world.posed_bodies import PosedBodies, PosedScene
 
-_TOUCH_N = 2.0  # what the pad's spring pushes with when it touches
-_ARRIVED_M, _ARRIVED_RAD = 1e-4, 1e-3
+_ARRIVED_M, _ARRIVED_RAD = 1e-4, 1e-3  # a motion has ended: under what a camera tells apart
 _LAG_M = 0.002  # an arm that is this near has arrived
 _LEVER_M = 0.2  # a turn counts as the way of a point this far from the axis
 
@@ -272,7 +271,7 @@ class SuctionGripper:
         self, load: Float[np.ndarray, " 6"], peak_n: float, arrived: bool, touched: bool
     ) -> Reading:
         if touched:
-            load = load + np.array([0.0, 0.0, _TOUCH_N, 0.0, 0.0, 0.0])
+            load = load + np.array([0.0, 0.0, self._config.evaluate.hand.touch_n, 0.0, 0.0, 0.0])
         wrench = self._at_base(load)
         self._sample(wrench)
         followed, self._follows = self._follows, True

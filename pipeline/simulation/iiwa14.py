@@ -13,7 +13,7 @@ from pipeline.config.evaluation import HandConfig
 from pipeline.geometry.iiwa14 import AXES, LINKS, LinkShape
 
 GRIPPER_LINK = "pad"
-_FOOT_MASS_KG, _HAND_MASS_KG = 5.0, 0.6
+_FOOT_MASS_KG = 5.0  # it is fixed to the ground: any mass serves
 
 
 def stem_shape(hand: HandConfig) -> LinkShape:
@@ -31,7 +31,7 @@ def flange_from_gripper(hand: HandConfig) -> Float[np.ndarray, "4 4"]:
     return pose
 
 
-def urdf(hand: HandConfig) -> str:
+def urdf(hand: HandConfig, hand_mass_kg: float) -> str:
     """The arm with stem and pad, as URDF text."""
     robot = Xml.Element("robot", name="iiwa14")
     _link(robot, LINKS[0], _FOOT_MASS_KG)
@@ -49,7 +49,7 @@ def urdf(hand: HandConfig) -> str:
             velocity=repr(axis.speed_rad_s),
         )
         parent, d_m, alpha_rad = shape.link, axis.d_m, axis.alpha_rad
-    _link(robot, stem_shape(hand), _HAND_MASS_KG)
+    _link(robot, stem_shape(hand), hand_mass_kg)
     _joint(robot, "flange", "fixed", parent, "stem", d_m, alpha_rad)
     Xml.SubElement(robot, "link", name=GRIPPER_LINK)
     _joint(robot, "suction", "fixed", "stem", GRIPPER_LINK, hand.length_m, math.pi, math.pi)

@@ -21,9 +21,8 @@ from pipeline.simulation.floating import FloatingMover, Mover
 from pipeline.simulation.gripper_body import Sample, SuctionGripper
 from pipeline.world.scene import ClutterScene
 
-_COLOUR = (0.5, 0.5, 0.5)
+_COLOUR = (0.5, 0.5, 0.5)  # physics has no eyes
 _GONE_M = -0.05  # an object whose centre is lower than this has left the table
-_SETTLE_S = 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +117,7 @@ class Clutter:
         self.gripper.begin()
         for body_id in lifted:
             self.world.remove_entity(self.bodies.pop(body_id).entity)
-        self.gripper.settle(_SETTLE_S)
+        self.gripper.settle(self._config.evaluate.settle_s)
         for body_id in self._off_the_table():
             self.world.remove_entity(self.bodies.pop(body_id).entity)
         return made

@@ -18,8 +18,7 @@ from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.shape import solid_properties
 from pipeline.world.scene import ClutterScene, PlacedObject
 
-_DENSITY_KG_M3 = 300.0
-_FACE_M = 0.006
+_FACE_M = 0.006  # faces no larger than the pad's cells
 
 
 @dataclass(frozen=True)
@@ -47,8 +46,9 @@ class Scenario:
     segmented: bool = False
 
 
-_PLAIN = (0.07, 0.07, 0.04)
-_SLIM = (0.14, 0.024, 0.03)
+_PLAIN = (0.07, 0.07, 0.04)  # a box that the pad seals on with room to spare
+_SLIM = (0.14, 0.024, 0.03)  # Supplement VIII: a bar narrower than the pad
+# The failure modes of Supplement VIII, one after the other.
 SCENARIOS = (
     Scenario("plain", _PLAIN),
     Scenario("transparent", _PLAIN, material="transparent"),
@@ -71,10 +71,10 @@ def seeing(config: RunConfig, scenario: Scenario) -> RunConfig:
 
 
 def trials(
-    scenario: Scenario, count: int, rng: np.random.Generator
+    scenario: Scenario, count: int, density_kg_m3: float, rng: np.random.Generator
 ) -> Iterator[tuple[ClutterScene, dict[str, CatalogueObject]]]:
     """So many scenes of a kind."""
-    item = _box(scenario)
+    item = _box(scenario, density_kg_m3)
     for number in range(count):
         middle = np.array([*rng.uniform(-0.1, 0.1, 2), 0.0])
         # What passes begins upstream.
@@ -107,7 +107,7 @@ def _standing(
     return pose
 
 
-def _box(scenario: Scenario) -> CatalogueObject:
+def _box(scenario: Scenario, density_kg_m3: float) -> CatalogueObject:
     shape = trimesh.creation.box(scenario.sides_m).subdivide_to_size(_FACE_M)
     mesh = Mesh(np.asarray(shape.vertices, np.float64), np.asarray(shape.faces, np.int64))
     coarse = trimesh.creation.box(scenario.sides_m)
@@ -122,7 +122,7 @@ def _box(scenario: Scenario) -> CatalogueObject:
         scale=1.0,
         stretch=np.ones(3),
         target_extent_m=max(scenario.sides_m),
-        **solid_properties(mesh, _DENSITY_KG_M3),
+        **solid_properties(mesh, density_kg_m3),
         mesh=mesh,
         convex_parts=(part,),
         material=scenario.material,

@@ -16,7 +16,7 @@ from pipeline.physics.engine import Body, roll_freely
 from pipeline.simulation.suction import Holding, breaks
 
 _RATE_1_S = 40.0  # natural frequency; critically damped
-_GRAVITY = np.array([0.0, 0.0, -9.81])
+_GRAVITY = np.array([0.0, 0.0, -9.81])  # standard gravity to three digits
 
 
 @dataclass(eq=False)

@@ -21,7 +21,7 @@ from pipeline.simulation.iiwa14 import flange_from_gripper, stem_shape
 from tests.simulation.kinematics import flange_pose
 
 HAND, ARM, PAD_RADIUS_M = HandConfig(), ArmConfig(), 0.025
-CLEARANCE = ArmClearance(HAND, PAD_RADIUS_M, ARM.base_m[2])
+CLEARANCE = ArmClearance(HAND, PAD_RADIUS_M, ARM.base_m[2], ARM.margin_m)
 LONG_HAND = HandConfig(length_rg=20)  # one that meets its own arm more often
 RIGID = [*(shape.link for shape in LINKS), "stem"]  # along the chain
 SLACK_M = 0.005  # PhysX's cylinders are prisms; points are apart

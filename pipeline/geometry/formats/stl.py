@@ -25,6 +25,7 @@ from pipeline.geometry.polygons import Polygons
 from pipeline.geometry.topology import is_closed
 from pipeline.geometry.welding import weld
 
+# Binary STL: 80 bytes of text and a count, then 50 bytes a triangle.
 _HEADER_BYTES, _RECORD_BYTES = 84, 50
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("bits", "<u2")])
 _NEVER_COUNTED = (0, 2**32 - 1)  # written first, to be filled in at the end
