@@ -16,7 +16,7 @@ from pipeline.physics.engine import add_body, new_world
 from pipeline.physics.settling import fallen_off, settle
 from pipeline.world.scene import ClutterScene, PlacedObject
 
-_DROPS_AGAIN = 25  # drops of one pile before it is drawn anew; few piles need ten
+_DROPS_AGAIN = 25  # drops of one pile before its objects are drawn anew
 _COLOUR = (0.5, 0.5, 0.5)  # physics has no eyes
 
 

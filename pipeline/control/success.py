@@ -7,7 +7,7 @@ import numpy as np
 from scipy.stats import binomtest, fisher_exact, permutation_test
 
 CONFIDENCE = 0.95  # of the intervals that tables and summaries call 95 %
-RESAMPLES = 99_999  # tells p to about 1e-5, in a second
+RESAMPLES = 99_999  # p is told to 1 in 100 000
 
 
 def success_rate(lifted: int, attempts: int) -> tuple[float, float, float]:

@@ -22,9 +22,9 @@ from pipeline.referee.leak import (
 from pipeline.referee.pump import Fan
 
 _STILL_M = 1e-8  # a sweep that moves no vertex further than this is the last
-_MOST_SWEEPS = 20_000  # a hundred times what a seal needs
+_MOST_SWEEPS = 20_000  # bounds a press that does not come to rest
 _FORCE_EXACT = 1e-5  # of the force
-_MOST_TRIES = 200  # bisection ends long before
+_MOST_TRIES = 200  # bounds a search that does not end
 _RESIDUAL = 1e-8  # of the right-hand side
 
 

@@ -22,7 +22,7 @@ AIR_VISCOSITY_PA_S = 1.81e-5  # at 20 degrees
 AIR_DENSITY_KG_M3 = 1.20  # at 20 degrees and one atmosphere
 GRAIN_VOIDS = 0.4  # epsilon of grains that lie loosely
 WIDEST_FILM_M = 3e-3  # in wider gaps the pressure is even all the same, and matrices worse
-MOST_STEPS = 60  # a seal needs about ten
+MOST_STEPS = 60  # bounds a film that does not settle
 SETTLED = 1e-4  # of the fan's vacuum
 
 

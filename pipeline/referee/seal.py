@@ -19,7 +19,7 @@ from pipeline.referee.surface import Surface
 
 GRAVITY_M_S2 = 9.81  # standard gravity to three digits
 DRAWN_IN = 0.01  # the pad rests when the vacuum pulls as hard as it is pressed, to this share
-MOST_DRAWS = 8  # a pad settles in two or three
+MOST_DRAWS = 8  # bounds a pad that does not settle
 Way = Literal["compiled", "plain"]
 
 

@@ -28,9 +28,9 @@ _SPEEDS = np.array([axis.speed_rad_s for axis in AXES])
 _MARGIN_RAD = 0.01  # kept from the ends of the joints' ranges
 # A posture far from every limit, from which inverse kinematics starts.
 _ELBOW_UP = np.array([0.0, 0.5, 0.0, -1.4, 0.0, 1.2, 0.0])
-_SEEDS = 12  # further postures to start from: more find nothing new
+_SEEDS = 12  # further postures, at random, to start from
 _HEADINGS = 8  # turns of the round pad about its axis that are tried
-_ITERATIONS = 150  # of inverse kinematics; those that converge do so in thirty
+_ITERATIONS = 150  # bounds inverse kinematics that does not converge
 _GIVES_RAD = (0.1, 0.3, 0.6)  # of the elbow, where a joint is at its end
 _BY_ITSELF = [1, 1, 1, 0]  # shapes that share a bit of the third group do not collide
 
