@@ -28,9 +28,9 @@ def numbers_of(node: ast.AST) -> Iterator[float]:
     if isinstance(node, ast.Subscript):
         yield from numbers_of(node.value)
         return
-    if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
-        if not isinstance(node.value, bool):
-            yield node.value
+    value = node.value if isinstance(node, ast.Constant) else None
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        yield value
     for part in ast.iter_child_nodes(node):
         yield from numbers_of(part)
 
@@ -81,9 +81,11 @@ def hidden_defaults(source: str) -> list[str]:
         if "typer." in ast.unparse(node.args):
             continue  # a command's own options, which --help shows
         defaults = [*node.args.defaults, *(d for d in node.args.kw_defaults if d is not None)]
-        for default in defaults:
-            if any(abs(number) not in NEUTRAL for number in numbers_of(default)):
-                found.append(f"line {node.lineno}: {node.name}({ast.unparse(default)})")
+        found += [
+            f"line {node.lineno}: {node.name}({ast.unparse(default)})"
+            for default in defaults
+            if any(abs(number) not in NEUTRAL for number in numbers_of(default))
+        ]
     return found
 
 
