@@ -18,7 +18,7 @@ _TYPES = {
 }
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _CORNER_LISTS = ("vertex_indices", "vertex_index", "vertex_indexes", "vertices")
-_MOST_HEADER_BYTES = 64 * 1024
+_MOST_HEADER_BYTES = 64 * 1024  # a hundred times an honest one
 _START = re.compile(rb"ply[ \t]*(\r\n|\n|\r)")
 _END = re.compile(rb"[\r\n][ \t]*end_header[ \t]*(\r\n|\n|\r|$)")
 _NUMBERS_ALONE = re.compile(rb"[0-9eE+\-. \t\r\n]{24,256}")
