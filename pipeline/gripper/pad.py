@@ -101,10 +101,11 @@ def build_pad(config: PadConfig) -> Pad:
 
 def _ring_radii(config: PadConfig) -> Float[np.ndarray, " rings"]:
     """Rings up to r_v, then on to r_G, each in even steps of at most Delta_r."""
-    inner = math.ceil(config.seal_radius_m / config.radius_step_m - _ROUNDING)
+    # Counted in multiples of r_G: lengths in metres are rounded, which may add a ring.
+    inner = math.ceil(config.seal_radius_rg / config.radius_step_rg - _ROUNDING)
     radii = config.seal_radius_m * np.arange(1, inner + 1) / inner
     margin = config.radius_m - config.seal_radius_m
-    outer = math.ceil(margin / config.radius_step_m - _ROUNDING)
+    outer = math.ceil((1.0 - config.seal_radius_rg) / config.radius_step_rg - _ROUNDING)
     if outer > 0:
         beyond = config.seal_radius_m + margin * np.arange(1, outer + 1) / outer
         radii = np.concatenate([radii, beyond])

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import dblquad
 
@@ -233,6 +233,7 @@ def test_a_quarter_turn_about_z_permutes_f_x_and_f_y(seed: int) -> None:
 
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.floats(0.2, 20.0))
+@example(seed=0, factor=1.3116142406590432)  # metres, rounded, gave this pad one ring more
 def test_scaling_scene_and_pad_together_changes_nothing(seed: int, factor: float) -> None:
     scaled = CONFIG.pad.model_copy(update={"radius_m": CONFIG.pad.radius_m * factor})
     heights = bumpy(seed, PAD)
