@@ -58,6 +58,11 @@ class ObjectsConfig(ScaledSection):
     target_extent_max_rg: float = Field(
         6.4, gt=0, description="largest longest-extent after rescaling [r_G]; Supplement III"
     )
+    # Twice the pad's contact tolerance, 0.8 % of its radius: the two sides of a thinner sheet are
+    # one to the pad, and convex parts that flat are at the limit of what PhysX can cook.
+    min_thickness_m: float = Field(
+        2e-4, ge=0, description="objects whose 2 V / A stays under this are refused [m]"
+    )
     density_kg_m3: float = Field(300.0, gt=0, description="mass from the closed mesh [kg/m3]")
     transparent: tuple[str, ...] = Field(
         (), description="names (with * and ?) of objects that depth cameras see through; VIII"

@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from pipeline.config.objects import ObjectsConfig
+from pipeline.errors import MeshError
 from pipeline.geometry.convex_parts import convex_parts
 from pipeline.geometry.descriptor import ShapeDescriptor, describe
 from pipeline.geometry.mesh import Mesh
@@ -18,6 +19,7 @@ from pipeline.geometry.rescaling import draw_stretch, draw_target_extent, rescal
 from pipeline.geometry.shape import (
     ShapeClass,
     mass_properties,
+    mean_thickness,
     nsvr,
     shape_class,
     solid_properties,
@@ -99,9 +101,22 @@ def content_of(name: str, sha256: str) -> str:
 def measure_object(source: MeshSource, config: ObjectsConfig) -> MeasuredObject:
     """Repair and NSVR. Raises MeshError where the source must be refused."""
     mesh, repairs = repair(source.label, source.mesh, config.max_hole_fraction)
+    check_thickness(source.label, mesh, config)
     value = nsvr(mesh)
     changes = (*source.notes, *repairs)
     return MeasuredObject(source, mesh, changes, value, shape_class(value), describe(mesh))
+
+
+def check_thickness(label: str, mesh: Mesh, config: ObjectsConfig) -> None:
+    """Raise MeshError for a sheet or needle too thin at the largest size it may be given."""
+    largest = config.target_extent_max_m if config.rescaled else float(mesh.extents_m.max())
+    thickness = mean_thickness(mesh) / float(mesh.extents_m.max()) * largest
+    if thickness < config.min_thickness_m:
+        raise MeshError(
+            f"{label} is too thin: {1e3 * thickness:.2g} mm (2 V / A) at a length of "
+            f"{1e3 * largest:.0f} mm, and pad and physics need {1e3 * config.min_thickness_m:.2g}",
+            "Give it a thickness, or lower objects.min_thickness_m",
+        )
 
 
 def finish_object(
@@ -161,10 +176,15 @@ def stretched_copy(
 
 
 def _target_extent_m(mesh: Mesh, config: ObjectsConfig, rng: np.random.Generator) -> float:
-    """Longest extent to rescale to: drawn, or the mesh's own where nothing is rescaled."""
+    """Longest extent to rescale to: drawn, or the mesh's own where nothing is rescaled.
+
+    A thin object is not drawn so small that pad and physics could no longer hold it.
+    """
+    longest = float(mesh.extents_m.max())
     if config.rescaled:
-        return draw_target_extent(config, rng)
-    return float(mesh.extents_m.max())
+        least = config.min_thickness_m * longest / mean_thickness(mesh)
+        return draw_target_extent(config, rng, least)
+    return longest
 
 
 def material_of(name: str, config: ObjectsConfig) -> Material:

@@ -21,7 +21,7 @@ from scipy.spatial import ConvexHull
 from pipeline.config.objects import ConvexPartsConfig
 from pipeline.geometry.manifolds import from_manifold, to_manifold
 from pipeline.geometry.mesh import Mesh
-from pipeline.geometry.shape import volume
+from pipeline.geometry.shape import outer_surface, volume
 
 # PhysX cooks convex meshes of up to 255 vertices; fewer make contacts cheaper.
 _MOST_VERTICES = 127
@@ -38,12 +38,13 @@ _METHOD_VERSION = 8
 
 
 def convex_parts(mesh: Mesh, config: ConvexPartsConfig, cache_dir: Path) -> tuple[Mesh, ...]:
-    """Closed convex meshes that together cover a closed mesh, in its frame.
+    """Closed convex meshes that together cover a closed mesh, cavities filled, in its frame.
 
     At most config.max_parts parts of at most 127 vertices each; deterministic. Results are kept
     in cache_dir by a digest of mesh, parameters and CoACD's version; a damaged entry is
     recomputed.
     """
+    mesh = outer_surface(mesh)
     entry = cache_dir / f"{cache_key(mesh, config)}.npz"
     parts = _read(entry)
     if parts is None:

@@ -1,12 +1,13 @@
-"""From a mesh as it came to one watertight outer surface, every change recorded."""
+"""From a mesh as it came to one watertight body, every change recorded."""
 
 import manifold3d
 import numpy as np
 import trimesh
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from pipeline.errors import MeshError
 from pipeline.geometry import topology
+from pipeline.geometry.bodies import one_body, outward
 from pipeline.geometry.manifolds import from_manifold, to_manifold
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.shape import surface_area, volume
@@ -14,17 +15,21 @@ from pipeline.geometry.welding import weld
 
 # Vertices nearer than this share of the longest extent are one vertex written twice.
 _MERGE_SHARE = 1e-7
-# Parts with less of the largest part's volume are debris of the scan.
-_DEBRIS_SHARE = 1e-3
+# An open part is a sheet, and no body with an opening, where closing it would take this share of
+# its own area: 1 for a flat one, half for a hemisphere, a fifth for a pipe five radii long.
+_SHEET_OPENING_SHARE = 0.25
+# Loose sheets are labels and marks where together they have at most this share of the bodies' area.
+_MOST_LOOSE_SHARE = 0.5
 # A cube has V / A^1.5 = 0.068; a sheet whose two sides coincide has none.
 _LEAST_FULLNESS = 1e-6
 
 
 def repair(label: str, mesh: Mesh, max_hole_fraction: float) -> tuple[Mesh, tuple[str, ...]]:
-    """The watertight outer surface, and what was done to get it (nothing: an empty tuple).
+    """The watertight surface, and what was done to get it (nothing: an empty tuple).
 
     max_hole_fraction: largest share of the surface that closing its openings may add [1].
-    The result is closed, consistently wound, outward, of one connected body.
+    The result is closed, consistently wound, of one connected body: its outer surface points
+    outward, the shells of its cavities, if any, inward, so that volume and mass lack them.
     Raises MeshError, naming the mesh and the reason, where no honest repair leads there: an open
     shell has no inside, and no number is made up for it.
     """
@@ -34,10 +39,11 @@ def repair(label: str, mesh: Mesh, max_hole_fraction: float) -> tuple[Mesh, tupl
         mesh = _drop_bad_faces(mesh, done)
         if len(mesh.faces) == 0:
             raise MeshError(f"{label} has no face of any area", "Mend the mesh")
+        mesh = _leave_loose_sheets(mesh, max_hole_fraction, done)
         _refuse_soup(label, mesh)
         mesh = _consistent_winding(mesh, done)
         mesh = _fill_holes(label, mesh, max_hole_fraction, done)
-    mesh = _outer_body(label, mesh, done)
+    mesh = _one_body(label, mesh, done)
     mesh = _drop_unused_vertices(mesh)
     _check_closed(label, mesh)
     return mesh, tuple(done)
@@ -129,6 +135,53 @@ def _fill_holes(label: str, mesh: Mesh, max_hole_fraction: float, done: list[str
     return Mesh(vertices, np.concatenate([mesh.faces, caps.faces]))
 
 
+def _leave_loose_sheets(mesh: Mesh, max_hole_fraction: float, done: list[str]) -> Mesh:
+    """Without open sheets that hang on nothing beside a closed body, as a label's decal.
+
+    They stay, for the body to be closed or refused with them, where closing all openings is
+    allowed, where nothing else is there, or where they are too large to be a mark on it.
+    """
+    groups = topology.components(mesh.faces)
+    parts = [topology.submesh(mesh, group) for group in groups]
+    areas = np.array([surface_area(part) for part in parts])
+    openings = np.array([_opening_area(part) for part in parts])
+    sheets = (openings > _SHEET_OPENING_SHARE * areas) & ~_on_shared_edges(mesh, groups)
+    if (
+        openings.sum() <= max_hole_fraction * areas.sum()
+        or sheets.all()
+        or areas[sheets].sum() > _MOST_LOOSE_SHARE * areas[~sheets].sum()
+    ):
+        return mesh
+    share = areas[sheets].sum() / areas.sum()
+    done.append(f"left off {int(sheets.sum())} loose sheet(s), {share:.1%} of the surface")
+    kept = [group for group, sheet in zip(groups, sheets, strict=True) if not sheet]
+    return topology.submesh(mesh, np.sort(np.concatenate(kept)))
+
+
+def _on_shared_edges(mesh: Mesh, groups: list[Int[np.ndarray, " k"]]) -> Bool[np.ndarray, " g"]:
+    """Whether a part has an edge that three or more faces share: it hangs on another part."""
+    edges = np.sort(topology.directed_edges(mesh.faces), axis=1)
+    _, inverse, counts = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
+    shared = np.any((counts[inverse.reshape(-1)] > 2).reshape(-1, 3), axis=1)
+    return np.array([bool(np.any(np.take(shared, group))) for group in groups])
+
+
+def _opening_area(part: Mesh) -> float:
+    """Area of the fans that would close a part; without bound where its openings are no loops."""
+    if topology.is_closed(part):
+        return 0.0
+    try:
+        loops = topology.boundary_loops(part.faces)
+    except ValueError:
+        return float("inf")
+    count = len(part.vertices_m)
+    middles = np.array([part.vertices_m[loop].mean(axis=0) for loop in loops]).reshape(-1, 3)
+    fans = [_fan(part.vertices_m, loop, count + k) for k, loop in enumerate(loops)]
+    if not fans:
+        return 0.0
+    return surface_area(Mesh(np.concatenate([part.vertices_m, middles]), np.concatenate(fans)))
+
+
 def _fan(
     vertices_m: Float[np.ndarray, "n 3"], loop: Int[np.ndarray, " k"], middle: int
 ) -> Int[np.ndarray, "f 3"]:
@@ -138,51 +191,15 @@ def _fan(
     return np.column_stack([np.roll(loop, -1), loop, np.full(len(loop), middle)])
 
 
-def _outer_body(label: str, mesh: Mesh, done: list[str]) -> Mesh:
-    """One outward surface: parts turned outward, debris dropped, the rest united."""
-    parts = [topology.submesh(mesh, part) for part in topology.components(mesh.faces)]
-    if len(parts) == 1 and topology.is_closed(mesh):
-        return _outward(mesh, done)
-    solids = _solids(label, mesh)
-    outward = [_outward(solid, done) for solid in solids]
-    volumes = np.array([volume(solid) for solid in outward])
-    if not volumes.max() > 0.0:
-        raise MeshError(f"{label} encloses no volume", "Give its wall a thickness")
-    kept = [
-        solid
-        for solid, v in zip(outward, volumes, strict=True)
-        if v > _DEBRIS_SHARE * volumes.max()
-    ]
-    if len(kept) < len(solids):
-        done.append(f"dropped {len(solids) - len(kept)} specks")
-    if len(kept) == 1:
-        return kept[0]
-    united = manifold3d.Manifold.batch_boolean(
-        [_manifold(label, solid) for solid in kept], manifold3d.OpType.Add
-    )
-    done.append(f"united {len(kept)} overlapping or nested parts")
-    bodies = sorted(united.decompose(), key=lambda body: -body.volume())
-    rest = sum(body.volume() for body in bodies[1:]) / bodies[0].volume()
-    if rest > _DEBRIS_SHARE:
-        raise MeshError(
-            f"{label} is {len(bodies)} bodies that do not touch, not one rigid object",
-            "Put each body into a file of its own, or join them",
-        )
-    return from_manifold(bodies[0])
-
-
-def _solids(label: str, mesh: Mesh) -> list[Mesh]:
-    """Closed parts, larger first; where surfaces meet in an edge they are taken apart there."""
+def _one_body(label: str, mesh: Mesh, done: list[str]) -> Mesh:
+    """One body: parts turned outward, the overlapping united, cavities kept, debris dropped."""
     if topology.is_closed(mesh):
-        return [topology.submesh(mesh, part) for part in topology.components(mesh.faces)]
-    return [from_manifold(body) for body in _manifold(label, mesh).decompose()]
-
-
-def _outward(mesh: Mesh, done: list[str]) -> Mesh:
-    if volume(mesh) >= 0.0:
-        return mesh
-    done.append("turned a part inside out")
-    return Mesh(mesh.vertices_m, mesh.faces[:, ::-1])
+        shells = [topology.submesh(mesh, part) for part in topology.components(mesh.faces)]
+        if len(shells) == 1:
+            return outward(mesh, done)
+    else:  # where surfaces meet in an edge they are taken apart there
+        shells = [from_manifold(body) for body in _manifold(label, mesh).decompose()]
+    return one_body(label, shells, done)
 
 
 def _manifold(label: str, mesh: Mesh) -> manifold3d.Manifold:

@@ -7,9 +7,15 @@ from pipeline.config.objects import ObjectsConfig
 from pipeline.geometry.mesh import Mesh
 
 
-def draw_target_extent(config: ObjectsConfig, rng: np.random.Generator) -> float:
-    """Longest extent after rescaling, uniform between the configured bounds [m]."""
-    return float(rng.uniform(config.target_extent_min_m, config.target_extent_max_m))
+def draw_target_extent(
+    config: ObjectsConfig, rng: np.random.Generator, least_m: float = 0.0
+) -> float:
+    """Longest extent after rescaling, uniform between the configured bounds [m].
+
+    least_m: a lower bound that the object itself asks for, at most the upper one.
+    """
+    least = min(max(config.target_extent_min_m, least_m), config.target_extent_max_m)
+    return float(rng.uniform(least, config.target_extent_max_m))
 
 
 def draw_stretch(config: ObjectsConfig, rng: np.random.Generator) -> Float[np.ndarray, " 3"]:

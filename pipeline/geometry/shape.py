@@ -48,7 +48,7 @@ def solid_properties(mesh: Mesh, density_kg_m3: float) -> SolidProperties:
     """The functions below, together. Raises ValueError where the volume is not positive."""
     mass, value = mass_properties(mesh, density_kg_m3), nsvr(mesh)
     return {
-        "area_m2": surface_area(mesh),
+        "area_m2": surface_area(outer_surface(mesh)),
         "volume_m3": volume(mesh),
         "nsvr": value,
         "shape_class": shape_class(value),
@@ -92,6 +92,11 @@ def outer_surface(mesh: Mesh) -> Mesh:
     if len(outward) in (0, len(shells)):
         return mesh
     return topology.submesh(mesh, np.sort(np.concatenate(outward)))
+
+
+def mean_thickness(mesh: Mesh) -> float:
+    """2 V / A over all shells of a closed mesh [m]: a sheet's thickness, a needle's radius."""
+    return 2 * volume(mesh) / surface_area(mesh)
 
 
 def shape_class(value: float) -> ShapeClass:

@@ -70,7 +70,7 @@ def test_overlapping_parts_become_one_outer_surface() -> None:
     result, done = repaired(mesh_of(both))
     assert is_closed(result)
     assert volume(result) == pytest.approx(2.0 - 0.5 * 0.8 * 0.9)
-    assert any("united 2" in step for step in done)
+    assert any("united 2 parts" in step for step in done)
 
 
 def open_bowl() -> Mesh:
