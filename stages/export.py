@@ -33,7 +33,20 @@ class Format(StrEnum):
 
 
 def export_run(folder: RunFolder, wanted: Format, least_quality: float) -> Path:
-    """Write ``<run>/export/<format>/``, its manifest last; the folder that it wrote.
+    """Write ``<run>/export/<format>/``, its manifest last.
+
+    Parameters
+    ----------
+    folder
+        The run.
+    wanted
+        Format that is written.
+    least_quality
+        q from which a grasp counts as a success in formats that know only two.
+
+    Returns
+    -------
+    The folder that was written.
 
     Raises
     ------

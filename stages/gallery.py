@@ -32,6 +32,11 @@ MARGIN = 0.92  # of the sphere around the objects, which they never fill
 def make_gallery(folder: RunFolder) -> None:
     """Render the sheet of a run and write it beside the run's scenes.
 
+    Parameters
+    ----------
+    folder
+        The run.
+
     Raises
     ------
     ArtifactError

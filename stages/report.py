@@ -27,6 +27,15 @@ FIGURES = "report"  # folder of the pictures, beside the page
 def make_report(folder: RunFolder) -> Path:
     """Write ``report.html``, which needs no other file, and ``report.md`` with ``report/``.
 
+    Parameters
+    ----------
+    folder
+        The run.
+
+    Returns
+    -------
+    The HTML page.
+
     Raises
     ------
     ArtifactError

@@ -21,6 +21,17 @@ LOCAL = "127.0.0.1"  # the viewer would otherwise listen to the whole network
 def recordings_of(folder: RunFolder, stage: str | None) -> list[Path]:
     """Recordings of one stage, or of all that there are, in the pipeline's order.
 
+    Parameters
+    ----------
+    folder
+        The run.
+    stage
+        Name of a stage, or None for all.
+
+    Returns
+    -------
+    Paths of .rrd files that are there.
+
     Raises
     ------
     ArtifactError

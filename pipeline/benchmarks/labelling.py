@@ -51,6 +51,10 @@ def end_to_end(
         A scene's kept grasps, warm already.
     labelled
         Grasps that ``label`` tries on all scenes together.
+
+    Returns
+    -------
+    Rates by their names in bench.json.
     """
     started, kept = time.perf_counter(), 0
     with tempfile.TemporaryDirectory() as scratch:

@@ -52,6 +52,15 @@ class CameraFile:
 def read_camera_file(path: Path) -> CameraFile:
     """Read JSON or YAML in any of the layouts of `camera_of`.
 
+    Parameters
+    ----------
+    path
+        JSON, where its name ends so, else YAML.
+
+    Returns
+    -------
+    What the file says.
+
     Raises
     ------
     PictureError
@@ -88,6 +97,10 @@ def camera_of(content: Any, source: str) -> CameraFile:
         Parsed JSON or YAML.
     source
         The file's name, for errors.
+
+    Returns
+    -------
+    Intrinsics with the project's pixel centres, and what else is said.
 
     Raises
     ------

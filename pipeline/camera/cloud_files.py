@@ -24,6 +24,10 @@ def read_cloud_m(path: Path, scale_m: float | None) -> Float[np.ndarray, "n 3"]:
     scale_m
         Metres that one unit of the file stands for; None: 1.
 
+    Returns
+    -------
+    Points in metres, shape (n, 3).
+
     Raises
     ------
     PictureError

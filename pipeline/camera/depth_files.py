@@ -28,6 +28,10 @@ def read_depth_m(path: Path, scale_m: float | None) -> Float[np.ndarray, "h w"]:
         Metres that one unit of the file stands for; None: 0.001 for integers (millimetres, as
         most drivers write), 1 for floating-point numbers.
 
+    Returns
+    -------
+    Depth along the optical axis [m], shape (h, w).
+
     Raises
     ------
     PictureError
@@ -95,6 +99,10 @@ def read_colour(path: Path, shape: tuple[int, int]) -> UInt8[np.ndarray, "h w 3"
     shape
         Height and width of the depth image.
 
+    Returns
+    -------
+    Red, green and blue, shape (h, w, 3).
+
     Raises
     ------
     PictureError
@@ -105,6 +113,17 @@ def read_colour(path: Path, shape: tuple[int, int]) -> UInt8[np.ndarray, "h w 3"
 
 def read_mask(path: Path, shape: tuple[int, int]) -> Bool[np.ndarray, "h w"]:
     """Where grasps may be: pixels of a mask's picture that are not black.
+
+    Parameters
+    ----------
+    path
+        Any format that Pillow reads.
+    shape
+        Height and width of the depth image.
+
+    Returns
+    -------
+    True where grasps may be, shape (h, w).
 
     Raises
     ------
@@ -119,6 +138,17 @@ def read_mask(path: Path, shape: tuple[int, int]) -> Bool[np.ndarray, "h w"]:
 
 def read_instances(path: Path, shape: tuple[int, int]) -> Int[np.ndarray, "h w"]:
     """Instance labels of the pixels, 0 for the background.
+
+    Parameters
+    ----------
+    path
+        A picture of grey levels, 8 or 16 bits.
+    shape
+        Height and width of the depth image.
+
+    Returns
+    -------
+    A label a pixel, 0 for the background, shape (h, w).
 
     Raises
     ------

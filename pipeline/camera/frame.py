@@ -57,6 +57,21 @@ def camera_of_picture(
 ) -> PinholeCamera:
     """A camera that took a picture of a shape (height, width).
 
+    Parameters
+    ----------
+    name
+        What the camera is called.
+    shape
+        Height and width of the picture [px].
+    intrinsics
+        Camera matrix in pixels, pixel centres at +0.5, shape (3, 3).
+    world_from_camera
+        Pose of CCS, shape (4, 4).
+
+    Returns
+    -------
+    The camera, without noise and without bounds of its range.
+
     Raises
     ------
     PictureError
@@ -104,6 +119,10 @@ def frame_of_cloud(
         Points in CCS: x right, y down, z forward.
     world_from_camera
         Pose of CCS, None where it is not known.
+
+    Returns
+    -------
+    A frame whose pixels hold the nearest of their points.
 
     Raises
     ------

@@ -59,6 +59,15 @@ class FrameFiles:
 def read_frame(files: FrameFiles) -> Frame:
     """Read one frame.
 
+    Parameters
+    ----------
+    files
+        Where its parts lie.
+
+    Returns
+    -------
+    The frame.
+
     Raises
     ------
     PictureError
@@ -138,6 +147,17 @@ def within_workspace(frame: Frame, workspace: Path) -> Frame:
     The file is JSON with ``box_m`` (two opposite corners in the frame's world, which is CCS where
     the frame has no pose), ``polygon_m`` (corners in the world's x and y) or ``polygon_px``
     (corners in the picture, column and row).
+
+    Parameters
+    ----------
+    frame
+        The picture, in its own world.
+    workspace
+        The JSON file.
+
+    Returns
+    -------
+    The same frame, with fewer pixels allowed.
 
     Raises
     ------

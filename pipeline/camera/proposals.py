@@ -74,6 +74,10 @@ def propose_grasps(
     rng
         Draws contacts.
 
+    Returns
+    -------
+    At most `predict.top` grasps, the best first.
+
     Raises
     ------
     PictureError
@@ -146,6 +150,10 @@ def clear_of_support(
         The stem's measures.
     tolerance_m
         How far below the plane a rim may be: the pad is soft, the plane measured [m].
+
+    Returns
+    -------
+    Whether each pose keeps clear, shape (k,).
     """
     height_m, cosine = support_from_contact[:, 2, 3], support_from_contact[:, 2, 2]
     sine = np.sqrt(np.maximum(1.0 - cosine**2, 0.0))
@@ -266,8 +274,16 @@ def pixels_of(
 
     Parameters
     ----------
+    frame
+        The picture.
+    points_m
+        Points in the frame's world, shape (k, 3) [m].
     within
         Whether the picture's edges count; else all that lies ahead of the camera does.
+
+    Returns
+    -------
+    Column and row of each, shape (k, 2), and whether it is seen, shape (k,).
     """
     local = transform_points(invert(frame.camera.world_from_camera), points_m)
     k = frame.camera.intrinsics

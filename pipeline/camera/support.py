@@ -77,6 +77,10 @@ def find_support(
     rng
         Draws the points that planes are fitted to.
 
+    Returns
+    -------
+    The plane with its outline and the walls around it.
+
     Raises
     ------
     PictureError
@@ -152,6 +156,10 @@ def inside(
         In the support's frame.
     config
         Margins.
+
+    Returns
+    -------
+    Whether each point does, shape (n,).
     """
     within = np.ones(len(points_m), dtype=bool)
     for wall in support.walls:

@@ -33,6 +33,25 @@ def build_clutter(
     Each object is drawn as often as any other, give or take one. A clutter that misses its
     level's definition is drawn again, at most ``placement_attempts`` times.
 
+    Parameters
+    ----------
+    scene_id
+        What the scene is called.
+    level
+        1 to 9, Table II.
+    split
+        Split that the objects of the pool belong to.
+    pool
+        Objects to draw from.
+    config
+        Section scenes of the run.
+    seed
+        Of everything that is drawn.
+
+    Returns
+    -------
+    The clutter at rest, its gaps measured.
+
     Raises
     ------
     SceneError
@@ -90,6 +109,21 @@ def measured(
     config: ScenesConfig,
 ) -> Float[np.ndarray, "n n"]:
     """Gaps on the true meshes, of far pairs a lower bound, held to the level's definition.
+
+    Parameters
+    ----------
+    items
+        The objects, in the order of their poses.
+    poses
+        world_from_object of each, at rest.
+    distribution
+        Isolated, multiple or stacked.
+    config
+        Section scenes of the run.
+
+    Returns
+    -------
+    Gap of every pair [m], shape (n, n), inf on the diagonal.
 
     Raises
     ------

@@ -26,6 +26,19 @@ def resting_pose(
 ) -> Float[np.ndarray, "4 4"]:
     """A stable pose of the object alone on the table: dropped in SE(3), settled.
 
+    Parameters
+    ----------
+    item
+        The object.
+    config
+        Section scenes of the run.
+    rng
+        Draws orientations.
+
+    Returns
+    -------
+    world_from_object at rest, shape (4, 4).
+
     Raises
     ------
     SceneError
@@ -50,7 +63,18 @@ def pile(
 ) -> tuple[sapien.Scene, list[Body], float]:
     """Objects dropped one by one in SE(3) into a column of walls, which then goes away.
 
-    Returns the world, its bodies at rest and the simulated time [s].
+    Parameters
+    ----------
+    items
+        What is dropped, in this order.
+    config
+        Section scenes of the run.
+    rng
+        Draws orientations and places.
+
+    Returns
+    -------
+    The world, its bodies at rest, and the simulated time [s].
 
     Raises
     ------

@@ -73,12 +73,22 @@ def pairwise_gaps_m(
 
     Parameters
     ----------
+    surfaces
+        True surfaces of the bodies, in their own frames.
+    poses
+        world_from_object of each.
     beyond_m
         Pairs whose bounding boxes are farther apart than this are not measured and get the
         boxes' distance, which is a lower bound of the gap.
-    known, known_poses
-        Gaps by the same ``beyond_m`` at other poses; a pair of which neither has moved since
-        keeps its own.
+    known
+        Gaps by the same ``beyond_m`` at ``known_poses``; a pair of which neither has moved
+        since keeps its own. None: nothing is known.
+    known_poses
+        Poses at which ``known`` was measured.
+
+    Returns
+    -------
+    Gaps [m], shape (n, n).
     """
     count = len(surfaces)
     gaps = np.full((count, count), NO_NEIGHBOUR_M)
@@ -105,9 +115,17 @@ def nearest_gaps_m(
 
     Parameters
     ----------
+    surfaces
+        True surfaces of the bodies, in their own frames.
+    poses
+        world_from_object of each.
     bounds_m
         Lower bounds of the gaps, as of ``pairwise_gaps_m``: pairs whose bound exceeds a gap
         already found are not measured.
+
+    Returns
+    -------
+    Gaps [m], shape (n,).
     """
     nearest = np.full(len(surfaces), NO_NEIGHBOUR_M)
     for i in range(len(surfaces)):

@@ -19,6 +19,15 @@ LEVELS = range(1, 10)  # Table II numbers them so
 def level_of(level: int) -> tuple[ShapeClass, Distribution]:
     """Shape class and distribution of a level; Table II reads row by row.
 
+    Parameters
+    ----------
+    level
+        1 to 9.
+
+    Returns
+    -------
+    Its row and its column in the table.
+
     Raises
     ------
     ValueError

@@ -31,6 +31,21 @@ def place_isolated(
 ) -> list[Float[np.ndarray, "4 4"]]:
     """Every gap at least ``isolated_gap_min_m``: random places, refused while too near.
 
+    Parameters
+    ----------
+    surfaces
+        True surfaces of the objects, in their own frames.
+    resting
+        A stable pose of each on the table.
+    config
+        Section scenes of the run.
+    rng
+        Draws places and headings.
+
+    Returns
+    -------
+    world_from_object of each, in their order.
+
     Raises
     ------
     SceneError
@@ -73,6 +88,21 @@ def place_multiple(
 
     Each object slides in from outside, towards one that stands already, until its nearest gap
     is a random one within the bound.
+
+    Parameters
+    ----------
+    surfaces
+        True surfaces of the objects, in their own frames.
+    resting
+        A stable pose of each on the table.
+    config
+        Section scenes of the run.
+    rng
+        Draws directions and gaps.
+
+    Returns
+    -------
+    world_from_object of each, in their order.
 
     Raises
     ------

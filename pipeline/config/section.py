@@ -67,6 +67,10 @@ def with_radius(values: Any, radius_m: float, path: tuple[str, ...]) -> Any:
     path
         Names of the tables that lead to the section.
 
+    Returns
+    -------
+    The same values, with r_G in the named section.
+
     Raises
     ------
     ValueError

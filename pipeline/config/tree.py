@@ -127,6 +127,15 @@ def _pad_radius_m(values: Any) -> float | None:
 def load_run_config(path: Path) -> RunConfig:
     """Read and validate a run.toml.
 
+    Parameters
+    ----------
+    path
+        runs/<run>/run.toml.
+
+    Returns
+    -------
+    The validated tree.
+
     Raises
     ------
     ConfigError : the file is absent, is not TOML, or holds a key or value that

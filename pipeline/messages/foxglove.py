@@ -34,6 +34,10 @@ def raw_image(
         What took it.
     time_ns
         When, in simulated or recorded time.
+
+    Returns
+    -------
+    The message.
     """
     data = np.ascontiguousarray(image, dtype=dtype)
     return RawImage(

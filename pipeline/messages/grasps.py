@@ -138,6 +138,15 @@ def grasp_batch(origin: GraspOrigin, grasps: LabelledGrasps) -> GraspBatch:
 def grasps_of(message: GraspBatch) -> tuple[GraspOrigin, LabelledGrasps]:
     """The grasps of a message: views of its bytes wherever possible.
 
+    Parameters
+    ----------
+    message
+        Of a shard of stage grasps.
+
+    Returns
+    -------
+    Where the grasps are from, and the grasps.
+
     Raises
     ------
     ContentError

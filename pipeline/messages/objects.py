@@ -55,6 +55,15 @@ def object_message(item: CatalogueObject, split: str) -> objects_pb2.CatalogueOb
 def object_of(message: objects_pb2.CatalogueObject) -> CatalogueObject:
     """The object of a message.
 
+    Parameters
+    ----------
+    message
+        Of stage objects.
+
+    Returns
+    -------
+    The catalogue entry.
+
     Raises
     ------
     ContentError

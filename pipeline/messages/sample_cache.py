@@ -38,8 +38,14 @@ def cached_split(index: Path, split: str, cache: Path) -> Samples:
     ----------
     index
         The index of a sharded artifact.
+    split
+        Such as ``train``.
     cache
         Folder for the decoded files.
+
+    Returns
+    -------
+    The samples, mapped: what is not used is not in memory.
 
     Raises
     ------
@@ -81,6 +87,8 @@ def decode_shards(shards: dict[Path, ShardEntry], into: Path) -> None:
     ----------
     shards
         File → what the index says of it.
+    into
+        Folder that gets the files.
     """
     count = sum(entry.samples for entry in shards.values())
     arrays: dict[str, np.memmap] = {}
@@ -103,6 +111,11 @@ def decode_shards(shards: dict[Path, ShardEntry], into: Path) -> None:
 
 def _reserve(path: Path) -> None:
     """Take the disk's room for a file now: a map that meets a full disk ends the process.
+
+    Parameters
+    ----------
+    path
+        A file of its final length, still without blocks on the disk.
 
     Raises
     ------

@@ -41,6 +41,15 @@ def sample_batch(samples: Samples, object_names: tuple[str, ...]) -> SampleBatch
 def samples_of(message: SampleBatch) -> Samples:
     """The samples of a message: views of its bytes.
 
+    Parameters
+    ----------
+    message
+        Of a shard of stage shards.
+
+    Returns
+    -------
+    The samples, in the order of the message.
+
     Raises
     ------
     ContentError
@@ -60,6 +69,10 @@ def read_split(index: Path, split: str) -> Samples:
         The index of a sharded artifact.
     split
         Such as ``train``.
+
+    Returns
+    -------
+    The samples, in memory.
     """
     return joined_samples(list(_batches(listed_shards(index, [split]))))
 

@@ -77,6 +77,10 @@ def figures_of(message: TrainingResult, test_set: Samples) -> TestFigures:
         Of the training.
     test_set
         The test split that it was measured on; it holds what the message counts by.
+
+    Returns
+    -------
+    Errors and predictions on the test split.
     """
     predicted = from_tensor(message.test_prediction)
     by_class = dict(message.test_mae_by_class)

@@ -15,6 +15,19 @@ def settle(world: sapien.Scene, bodies: Sequence[Body], config: ScenesConfig) ->
     At rest: linear speed under ``settle_linear_m_s`` and rate under ``settle_angular_rad_s``
     throughout ``settle_hold_s``.
 
+    Parameters
+    ----------
+    world
+        PhysX scene.
+    bodies
+        All bodies that must come to rest.
+    config
+        Section scenes: what counts as rest, and how long to wait.
+
+    Returns
+    -------
+    Simulated time [s].
+
     Raises
     ------
     SceneError

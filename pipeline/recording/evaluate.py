@@ -82,8 +82,14 @@ def blueprint(with_arm: bool = False, scale: float = 1.0) -> rrb.Blueprint:
 
     Parameters
     ----------
+    with_arm
+        Whether an arm moves the gripper.
     scale
         Of the pad against Table I's; without effect where an arm sets the view.
+
+    Returns
+    -------
+    How the viewer lays the recording out.
     """
     eye_m = (0.5, -1.05, 0.8) if with_arm else (-0.55 * scale, -0.55 * scale, 0.5 * scale)
     target_m = (-0.2, 0.0, 0.25) if with_arm else (0.0, 0.0, 0.08 * scale)

@@ -96,6 +96,10 @@ def recording(stage: Recorded, blueprint: rrb.Blueprint) -> Iterator[rr.Recordin
     blueprint
         How the viewer lays the recording out.
 
+    Yields
+    ------
+    The open recording.
+
     Raises
     ------
     OSError

@@ -22,6 +22,13 @@ _CHOSEN_COLOUR = (60, 200, 90)  # green, as Fig. 1 marks the chosen network
 def draw_sweep(stage: MadeStage, figures: Mapping[str, Any]) -> None:
     """Draw the recording: errors are of the artifact, times of the summary.
 
+    Parameters
+    ----------
+    stage
+        The finished stage.
+    figures
+        Its summary, which holds the times.
+
     Raises
     ------
     ArtifactError

@@ -52,8 +52,14 @@ def sight_of(recording: Path, step: int | None = None) -> Sight:
 
     Parameters
     ----------
+    recording
+        An .rrd file.
     step
         Where on its timeline; None is where it opens by itself.
+
+    Returns
+    -------
+    What the viewer shows, and its state.
 
     Raises
     ------
@@ -113,6 +119,17 @@ def _viewer_command(port: int) -> list[str]:
 
 def _connected(process: subprocess.Popen[bytes], port: int) -> ViewerClient:
     """A client of the viewer once it answers.
+
+    Parameters
+    ----------
+    process
+        The running viewer.
+    port
+        Where it listens, on this machine alone.
+
+    Returns
+    -------
+    The client.
 
     Raises
     ------

@@ -51,6 +51,15 @@ class TrainingFacts:
 def read_summary(path: Path) -> dict[str, Any] | None:
     """A stage's headline figures; None where it was not made.
 
+    Parameters
+    ----------
+    path
+        runs/<run>/<stage>.summary.json.
+
+    Returns
+    -------
+    The figures by name, or None.
+
     Raises
     ------
     ArtifactError

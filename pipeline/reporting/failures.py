@@ -78,8 +78,20 @@ def failure_picture(
 
     Parameters
     ----------
+    attempt
+        Of the closed loop.
     names
-        The scene's objects by body id, from 1. The same attempt gives the same bytes.
+        The scene's objects by body id, from 1.
+    objects
+        Catalogue entry of each by its name.
+    config
+        Section scenes: the table that is drawn.
+    pad_radius_m
+        r_G [m].
+
+    Returns
+    -------
+    The bytes of a JPEG, the same for the same attempt, or None.
     """
     pads = from_tensor(attempt.gripper_path).reshape(-1, 4, 4)
     bodies = from_tensor(attempt.object_paths).reshape(len(pads), -1, 4, 4)

@@ -38,8 +38,16 @@ def html_page(markdown: str, title: str, files: Mapping[str, bytes]) -> str:
 
     Parameters
     ----------
+    markdown
+        The text.
+    title
+        Of the browser's window.
     files
         Path as the text names it → content.
+
+    Returns
+    -------
+    HTML that needs no other file.
     """
     parser = MarkdownIt("commonmark", {"html": False}).enable("table")
     parser.add_render_rule("image", _embedded)

@@ -90,6 +90,10 @@ def page_html(markdown: str, page: str, modules: Sequence[str]) -> str:
         Its path in the repository: what its links are relative to.
     modules
         Modules of the reference: a name of one of their members becomes a link to it.
+
+    Returns
+    -------
+    The HTML.
     """
     parser = MarkdownIt("commonmark", {"html": False}).enable("table")
     for rule in ("image", "link_open", "code_inline"):
@@ -111,6 +115,10 @@ def reference_link(name: str, modules: frozenset[str]) -> str | None:
         A module, or a member of one, such as ``pipeline.gripper.pad.build_pad``.
     modules
         Modules that the reference covers.
+
+    Returns
+    -------
+    Path within the site, with the member's anchor.
     """
     module, _, member = name.rpartition(".")
     if name in modules:

@@ -45,6 +45,17 @@ class Renderer(Protocol):
 def new_renderer(name: RendererName, config: ScenesConfig) -> Renderer:
     """The renderer asked for; ``auto`` is SAPIEN's, and Embree's with a notice without a driver.
 
+    Parameters
+    ----------
+    name
+        ``auto``, ``sapien`` or ``embree``.
+    config
+        Section scenes: the table that is rendered.
+
+    Returns
+    -------
+    A renderer, ready.
+
     Raises
     ------
     MachineError : SAPIEN's was asked for by name and no Vulkan driver can render.

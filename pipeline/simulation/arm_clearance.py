@@ -40,10 +40,18 @@ class ArmClearance:
     def __init__(
         self, hand: HandConfig, pad_radius_m: float, base_z_m: float, margin_m: float
     ) -> None:
-        """Parameters
+        """Links, hand and camera as shapes, at no posture yet.
+
+        Parameters
         ----------
+        hand
+            Measures of stem and camera.
+        pad_radius_m
+            r_G [m].
         base_z_m
-            Of the arm's foot above the table.
+            Height of the arm's foot over the table [m].
+        margin_m
+            Distance that counts as too near [m].
         """
         self._parts = _parts(hand, pad_radius_m, margin_m / 2)
         self._pairs = [

@@ -61,10 +61,23 @@ class SuctionGripper:
         config: RunConfig,
         mover: Mover,
     ) -> None:
-        """Parameters
+        """A gripper at home, holding nothing.
+
+        Parameters
         ----------
+        world
+            PhysX scene in which it moves.
         bodies
-            Those in the world; whoever takes one out of it takes it out here too.
+            Bodies of the world by body id; whoever takes one out of the world takes it out here
+            too.
+        objects
+            Catalogue entry of each body.
+        pad
+            The pad in GCS.
+        config
+            Sections gripper, scenes and evaluate.
+        mover
+            What moves it: nothing, or an arm.
         """
         self._world = world
         self._bodies = bodies

@@ -58,9 +58,15 @@ def breaks(limits: Holding, load: Float[np.ndarray, " 6"]) -> bool:
 
     Parameters
     ----------
+    limits
+        What the seal bears.
     load
         Force [N] and moment [N m] that the object exerts on the pad, in GCS; a pull away from
         the pad is along -z.
+
+    Returns
+    -------
+    True where the seal breaks.
     """
     pull = max(-float(load[2]), 0.0)
     return (
