@@ -45,6 +45,10 @@ class PictureError(SoftgripError):
     """A picture, a point cloud or a camera's description from outside cannot be used."""
 
 
+class PoseError(SoftgripError):
+    """A pose that was given is no rigid motion."""
+
+
 class SceneError(SoftgripError):
     """A clutter scene misses its level's definition."""
 

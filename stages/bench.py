@@ -18,12 +18,15 @@ from pipeline.config import RunConfig, load_run_config
 from pipeline.execution import RunFolder, generator, run_command, run_in_order
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.mesh import Mesh
+from pipeline.labelling.poses import ROUND, pad_of
+from pipeline.labelling.rounds import label_rounds
+from pipeline.labelling.scene import label_scene, scene_surfaces, visible_surface
 from pipeline.messages.objects import read_objects
 from pipeline.messages.scenes import read_scenes
 from pipeline.network.samples import Samples
+from pipeline.world.raycasting import RayScene
 from pipeline.world.scene import ClutterScene
 from stages.graph import RUNS_DIR
-from stages.grasps import ROUND, label_rounds, pad_of, ray_scene, synthesize, visible_surface
 
 PHASE_GRASPS = 4096  # enough for rates known to a percent
 PROBLEM_GRASPS = 1200  # of one scene: problems of all kinds
@@ -100,9 +103,12 @@ def labelled_scene(
     bench: Bench, scene: ClutterScene, wanted: int, rng: np.random.Generator
 ) -> labelling.Labelled:
     """Scene to grasps, its ray scene included."""
-    return synthesize(
-        scene, ray_scene(scene, bench.meshes, bench.config), bench.config, wanted, rng
-    )
+    return label_scene(scene, surfaces_of(bench, scene), bench.config, wanted, rng)
+
+
+def surfaces_of(bench: Bench, scene: ClutterScene) -> RayScene:
+    """The true surfaces of a scene."""
+    return scene_surfaces(scene, bench.meshes, bench.config.scenes.table_side_m)
 
 
 def end_to_end(bench: Bench) -> dict[str, object]:
@@ -123,29 +129,29 @@ def end_to_end(bench: Bench) -> dict[str, object]:
 
 def phases(bench: Bench) -> dict[str, object]:
     """Microseconds a grasp by phase, and the latency of one grasp alone."""
-    config, pad = bench.config, pad_of(bench.config)
+    config, pad = bench.config, pad_of(bench.config.gripper.pad)
     scene, rng = bench.scenes[-1], np.random.default_rng(0)
-    rays, body_ids = ray_scene(scene, bench.meshes, config)
-    surface = visible_surface(scene.views[0], rays, body_ids, pad.radius_m)
-    candidates, labels = label_rounds(surface, rays, body_ids, config, PHASE_GRASPS, rng)
+    surfaces = surfaces_of(bench, scene)
+    surface = visible_surface(scene.views[0], surfaces, pad.radius_m)
+    candidates, labels = label_rounds(surface, surfaces, config, PHASE_GRASPS, rng)
     written = labelled_scene(bench, scene, 1024, rng)
     return {
-        **labelling.phases(pad, config, scene.views[0], rays, body_ids, candidates, written),
+        **labelling.phases(pad, config, scene.views[0], surfaces, candidates, written),
         "iterations_max": int(labels.iterations.max()),
     }
 
 
 def quadratic_programs(bench: Bench) -> dict[str, object]:
     """The production solver against PIQP, sparse and dense, on the same problems."""
-    config, pad = bench.config, pad_of(bench.config)
+    config, pad = bench.config, pad_of(bench.config.gripper.pad)
     problems = []
     for scene in bench.scenes[-2:]:
-        rays, body_ids = ray_scene(scene, bench.meshes, config)
-        surface = visible_surface(scene.views[0], rays, body_ids, pad.radius_m)
+        surfaces = surfaces_of(bench, scene)
+        surface = visible_surface(scene.views[0], surfaces, pad.radius_m)
         rng = np.random.default_rng(1)
-        candidates, _ = label_rounds(surface, rays, body_ids, config, PROBLEM_GRASPS, rng)
+        candidates, _ = label_rounds(surface, surfaces, config, PROBLEM_GRASPS, rng)
         problems += solvers.problems_under(
-            pad, config.gripper, rays, body_ids, candidates, config.grasps.clearance_m
+            pad, config.gripper, surfaces, candidates, config.grasps.clearance_m
         )
     return solvers.figures(problems)
 
@@ -157,9 +163,7 @@ def scaling(bench: Bench) -> dict[str, object]:
         jobs = [WorkerJob(bench.folder, index, WORKER_SECONDS) for index in range(workers)]
         by_workers[workers] = round(sum(run_in_order(worker_rate, jobs, workers)))
     config = bench.config
-    by_faces = labelling.by_mesh_size(
-        pad_of(config), config.gripper, MESH_GRASPS, config.grasps.clearance_m
-    )
+    by_faces = labelling.by_mesh_size(config.gripper, MESH_GRASPS, config.grasps.clearance_m)
     return {
         "grasps_per_s_by_workers": by_workers,
         "grasps_per_s_by_faces": {faces: round(rate) for faces, rate in by_faces.items()},
@@ -170,13 +174,13 @@ def worker_rate(job: WorkerJob) -> float:
     """Labelled grasps a second of one worker, rays included, once it is warm."""
     bench = opened(job.folder)
     config, scene = bench.config, bench.scenes[job.scene]
-    rays, body_ids = ray_scene(scene, bench.meshes, config)
-    surface = visible_surface(scene.views[0], rays, body_ids, config.gripper.pad.radius_m)
+    surfaces = surfaces_of(bench, scene)
+    surface = visible_surface(scene.views[0], surfaces, config.gripper.pad.radius_m)
     rng = np.random.default_rng(job.scene)
-    label_rounds(surface, rays, body_ids, config, ROUND, rng)
+    label_rounds(surface, surfaces, config, ROUND, rng)
 
     def label() -> int:
-        return len(label_rounds(surface, rays, body_ids, config, 4 * ROUND, rng)[0])
+        return len(label_rounds(surface, surfaces, config, 4 * ROUND, rng)[0])
 
     return labelling.labelling_rate(label, job.seconds)
 

@@ -17,13 +17,15 @@ from pipeline.config import load_run_config
 from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder, generator, run_command
 from pipeline.labelling.heights import pad_heights
+from pipeline.labelling.poses import pad_of
+from pipeline.labelling.rounds import label_rounds
+from pipeline.labelling.scene import scene_surfaces, visible_surface
 from pipeline.messages.objects import read_objects
 from pipeline.messages.scenes import read_scenes
 from pipeline.regression.comparison import Figures, compared_count, differences
 from pipeline.regression.figures import figures_of
 from pipeline.regression.pads import write_pads
 from stages.graph import RUNS_DIR
-from stages.grasps import label_rounds, pad_of, ray_scene, visible_surface
 
 REFERENCE = Path("tests/regression/reference.json")
 PADS = Path("tests/regression/pads.mcap")
@@ -76,19 +78,19 @@ def draw_pads(folder: RunFolder, path: Path) -> None:
     config = load_run_config(folder.config)
     objects = read_objects(folder.artifact("objects"))
     meshes = {name: item.mesh for name, (item, _) in objects.items()}
-    pad = pad_of(config)
+    pad = pad_of(config.gripper.pad)
     heights, targets = [], []
     for scene in read_scenes(folder.artifact("scenes")):
-        rays, body_ids = ray_scene(scene, meshes, config)
-        surface = visible_surface(scene.views[0], rays, body_ids, pad.config.radius_m)
+        surfaces = scene_surfaces(scene, meshes, config.scenes.table_side_m)
+        surface = visible_surface(scene.views[0], surfaces, pad.config.radius_m)
         rng = generator(config.seed, "pads", scene.scene_id)
-        candidates, labels = label_rounds(surface, rays, body_ids, config, 512, rng)
+        candidates, labels = label_rounds(surface, surfaces, config, 512, rng)
         wanted = np.linspace(labels.q.min(), labels.q.max(), PADS_A_SCENE)
         chosen = np.abs(labels.q[None, :] - wanted[:, None]).argmin(axis=1)
         frames = candidates.world_from_contact[chosen]
-        found, below = pad_heights(frames, rays, pad, config.grasps.clearance_m)
+        found, below = pad_heights(frames, surfaces, pad, config.grasps.clearance_m)
         heights.append(found)
-        targets.append((body_ids[below] == candidates.body_id[chosen, None]) & (below >= 0))
+        targets.append(below == candidates.body_id[chosen, None])
     made = replace(read_provenance(folder.artifact("scenes")), stage="regress", inputs=())
     write_pads(path, made, np.concatenate(heights), np.concatenate(targets))
 

@@ -15,22 +15,23 @@ from pipeline.benchmarks.storage import PROVENANCE
 from pipeline.config import RunConfig
 from pipeline.config.grasps import GripperConfig
 from pipeline.geometry.mesh import Mesh
-from pipeline.gripper.batch import BLOCK, assemble_into, empty_batch, label_batch
+from pipeline.gripper.batch import BLOCK, assemble_into, empty_batch
 from pipeline.gripper.draping import drape_into
 from pipeline.gripper.limits import wrench_limit_ratios
 from pipeline.gripper.pad import Pad
 from pipeline.gripper.quality import target_wrench
 from pipeline.gripper.solvers.structured import solve_into
+from pipeline.labelling.grasps import GraspOrigin, LabelledGrasps
 from pipeline.labelling.heights import pad_heights
+from pipeline.labelling.poses import ROUND, label_poses
 from pipeline.labelling.sampling import Candidates, contact_frames
-from pipeline.messages.grasps import GraspOrigin, LabelledGrasps, grasp_batch
+from pipeline.messages.grasps import grasp_batch
 from pipeline.sensing.depth_noise import disturb
 from pipeline.sensing.sub_cloud import sub_clouds
 from pipeline.world.raycasting import RayScene
 from pipeline.world.scene import ClutterScene
 from pipeline.world.view import CameraView
 
-ROUND = 512  # as stage grasps labels them
 LATENCY_GRASPS = 1000  # enough for a 95th percentile
 _BUMPS = 8  # a surface neither flat nor hopeless
 
@@ -79,8 +80,7 @@ def phases(
     pad: Pad,
     config: RunConfig,
     view: CameraView,
-    rays: RayScene,
-    body_ids: Int[np.ndarray, " bodies"],
+    surfaces: RayScene,
     candidates: Candidates,
     written: Labelled,
 ) -> dict[str, object]:
@@ -92,18 +92,16 @@ def phases(
         The gripper, and the run.
     view
         The picture that sub clouds are cut from.
-    rays, body_ids
-        The scene's true surfaces, and the body id of each of its bodies.
+    surfaces
+        The scene's true surfaces.
     candidates
         What is labelled, phase by phase.
     written
         Kept grasps, for the time of writing.
     """
-    frames = candidates.world_from_contact
-    order = np.argsort(body_ids)
-    body = order[np.searchsorted(body_ids[order], candidates.body_id)]
+    frames, body = candidates.world_from_contact, candidates.body_id
     clearance_m = config.grasps.clearance_m
-    seconds = phase_seconds(pad, config.gripper, rays, frames, body, clearance_m)
+    seconds = phase_seconds(pad, config.gripper, surfaces, frames, body, clearance_m)
     per_grasp = {name: 1e6 * value / len(frames) for name, value in seconds.items()}
     laps = Laps()
     measured = disturb(view, np.random.default_rng(0))
@@ -118,7 +116,7 @@ def phases(
     some = slice(0, LATENCY_GRASPS)
     return {
         "us_per_grasp": {name: round(value, 1) for name, value in per_grasp.items()},
-        "latency_ms": latency_ms(pad, config.gripper, rays, frames[some], body[some], clearance_m),
+        "latency_ms": latency_ms(config.gripper, surfaces, frames[some], body[some], clearance_m),
     }
 
 
@@ -140,7 +138,18 @@ def phase_seconds(
 ) -> dict[str, float]:
     """Seconds that rays, draping, wrench and QP take on these grasps, block by block.
 
-    body : index of each grasp's own body in ``rays``.
+    Parameters
+    ----------
+    pad, config
+        The gripper.
+    rays
+        The true surfaces.
+    world_from_contact
+        Where the grasps are, shape (n, 4, 4).
+    body
+        Each grasp's own body, as ``rays`` numbers it, shape (n,).
+    clearance_m
+        Height of the rays' origins above the contact [m].
     """
     laps = Laps()
     lower, upper = wrench_limit_ratios(config.friction)
@@ -208,7 +217,6 @@ def phase_seconds(
 
 
 def latency_ms(
-    pad: Pad,
     config: GripperConfig,
     rays: RayScene,
     world_from_contact: Float[np.ndarray, "n 4 4"],
@@ -219,15 +227,13 @@ def latency_ms(
     times = []
     for row in range(len(world_from_contact)):
         started = time.perf_counter()
-        heights, below = pad_heights(world_from_contact[row : row + 1], rays, pad, clearance_m)
-        label_batch(pad, config, heights, below == body[row])
+        one = slice(row, row + 1)
+        label_poses(world_from_contact[one], body[one], rays, config, clearance_m)
         times.append(time.perf_counter() - started)
     return quantiles_ms(times)
 
 
-def by_mesh_size(
-    pad: Pad, config: GripperConfig, grasps: int, clearance_m: float
-) -> dict[int, float]:
+def by_mesh_size(config: GripperConfig, grasps: int, clearance_m: float) -> dict[int, float]:
     """Faces → grasps a second on one core, rays included, on a bumpy ball of 50 mm radius."""
     rates = {}
     for subdivisions in (3, 4, 5, 6, 7):
@@ -241,9 +247,7 @@ def by_mesh_size(
         )
         rays.cast(frames[:1, :3, 3] + frames[:1, :3, 2], -frames[:1, :3, 2])
         started = time.perf_counter()
-        for first in range(0, grasps, ROUND):
-            heights, below = pad_heights(frames[first : first + ROUND], rays, pad, clearance_m)
-            label_batch(pad, config, heights, below == 0)
+        label_poses(frames, np.zeros(grasps, dtype=np.int64), rays, config, clearance_m)
         rates[len(mesh.faces)] = grasps / (time.perf_counter() - started)
     return rates
 

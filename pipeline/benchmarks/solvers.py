@@ -1,7 +1,7 @@
 """The quality QP: milliseconds a problem, every solver on the same problems."""
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from pipeline.benchmarks.clock import seconds_of
 from pipeline.config.grasps import GripperConfig, SolverName
@@ -12,11 +12,9 @@ from pipeline.gripper.problem import QualityProblem
 from pipeline.gripper.quality import quality_problem
 from pipeline.gripper.solvers import SOLVERS
 from pipeline.labelling.heights import pad_heights
+from pipeline.labelling.poses import ROUND
 from pipeline.labelling.sampling import Candidates
 from pipeline.world.raycasting import RayScene
-
-ROUND = 512  # as stage grasps labels them
-
 
 PROBLEMS: dict[SolverName, int] = {"structured": 2000, "piqp-sparse": 200, "piqp-dense": 12}
 
@@ -36,8 +34,7 @@ def figures(problems: list[QualityProblem]) -> dict[str, object]:
 def problems_under(
     pad: Pad,
     config: GripperConfig,
-    rays: RayScene,
-    body_ids: Int[np.ndarray, " bodies"],
+    surfaces: RayScene,
     candidates: Candidates,
     clearance_m: float,
 ) -> list[QualityProblem]:
@@ -47,8 +44,8 @@ def problems_under(
     ----------
     pad, config
         The gripper.
-    rays, body_ids
-        The scene's true surfaces, and the body id of each of its bodies.
+    surfaces
+        The scene's true surfaces.
     candidates
         On bodies of that scene.
     clearance_m
@@ -62,8 +59,8 @@ def problems_under(
     for start in range(0, len(candidates), ROUND):
         rows = slice(start, start + ROUND)
         frames = candidates.world_from_contact[rows]
-        heights, below = pad_heights(frames, rays, pad, clearance_m)
-        on_target = body_ids[below] == candidates.body_id[rows, None]
+        heights, below = pad_heights(frames, surfaces, pad, clearance_m)
+        on_target = below == candidates.body_id[rows, None]
         problems += problems_of(pad, config, heights, on_target)
     return problems
 

@@ -15,7 +15,7 @@ import zarr
 
 from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact
 from pipeline.benchmarks.clock import seconds_of
-from pipeline.messages.grasps import LabelledGrasps
+from pipeline.labelling.grasps import LabelledGrasps
 from pipeline.messages.samples import STORED_AS, sample_batch, samples_of
 from pipeline.network.samples import Samples
 from schemas.softgrip.v1.samples_pb2 import SampleBatch

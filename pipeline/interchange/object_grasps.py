@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Int
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.transforms import invert
-from pipeline.messages.grasps import GraspOrigin, LabelledGrasps
+from pipeline.labelling.grasps import GraspOrigin, LabelledGrasps
 
 # Half a turn about x: its own inverse.
 GCS_FROM_BASE = np.diag([1.0, -1.0, -1.0, 1.0])

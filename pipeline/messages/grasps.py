@@ -1,12 +1,11 @@
 """Labelled grasps ↔ softgrip.v1.GraspBatch, pads to look at ↔ softgrip.v1.DrapedPads."""
 
-from dataclasses import dataclass, fields
-
 import numpy as np
-from jaxtyping import Bool, Float, Integer
 
 from pipeline.artifacts.tensors import set_tensors, tensors_of
 from pipeline.errors import ContentError
+from pipeline.labelling.grasps import GraspOrigin, LabelledGrasps
+from pipeline.labelling.shown_pads import ShownPads
 from schemas.softgrip.v1.grasps_pb2 import DrapedPads, GraspBatch
 
 # What each array is stored as; the field names are those of the message.
@@ -46,75 +45,6 @@ UNLESS_THERE = {"pictures": 1}
 
 PADS_STORED_AS = {"grasp": "u4", "height_m": "f4", "pressure": "f4"}
 PADS_SHAPES = {"grasp": "k", "height_m": "k v", "pressure": "k t"}
-
-
-@dataclass(frozen=True)
-class LabelledGrasps:
-    """Grasps of one scene seen from one viewpoint; arrays of one length n.
-
-    Attributes
-    ----------
-    world_from_gripper
-        (n, 4, 4) GCS at first touch, in WCS.
-    quality, pressure
-        (n,) q of S-1.12 and p of Eq. (2).
-    wrench
-        (n, 4) GW, dimensionless.
-    limit_slack
-        (n, 8) room to Eq. (8)-(11).
-    weight_summary
-        (n, 3) least, greatest and rms deviation from 1 of W.
-    contact_mask
-        (n, v) pad vertices in contact.
-    tilt_rad, proposal, keep_probability
-        The sampler's bias.
-    cloud, cloud_mask
-        (n, g, g, 3) and (n, g, g), units of r_G, origin at the contact.
-    touch_height_m
-        (n,) first touch above the contact.
-    pictures
-        (n,) how many pictures the cloud was cut from: one, or all of the scene.
-    """
-
-    object_index: Integer[np.ndarray, " n"]
-    body_id: Integer[np.ndarray, " n"]
-    world_from_gripper: Float[np.ndarray, "n 4 4"]
-    quality: Float[np.ndarray, " n"]
-    pressure: Float[np.ndarray, " n"]
-    wrench: Float[np.ndarray, "n 4"]
-    limit_slack: Float[np.ndarray, "n 8"]
-    weight_summary: Float[np.ndarray, "n 3"]
-    contact_mask: Bool[np.ndarray, "n v"]
-    status: Integer[np.ndarray, " n"]
-    iterations: Integer[np.ndarray, " n"]
-    tilt_rad: Float[np.ndarray, " n"]
-    proposal: Integer[np.ndarray, " n"]
-    keep_probability: Float[np.ndarray, " n"]
-    cloud: Float[np.ndarray, "n g g 3"]
-    cloud_mask: Bool[np.ndarray, "n g g"]
-    touch_height_m: Float[np.ndarray, " n"]
-    pictures: Integer[np.ndarray, " n"]
-
-    def __len__(self) -> int:
-        return len(self.quality)
-
-    def rows(self, start: int, stop: int) -> "LabelledGrasps":
-        """A contiguous part."""
-        return LabelledGrasps(*(getattr(self, f.name)[start:stop] for f in fields(self)))
-
-
-@dataclass(frozen=True)
-class GraspOrigin:
-    """What the grasps of one batch have in common, and the names its indices point into."""
-
-    scene_id: str
-    viewpoint: str
-    level: int
-    split: str
-    object_names: tuple[str, ...]
-    limit_names: tuple[str, ...]
-    status_names: tuple[str, ...]
-    proposal_names: tuple[str, ...]
 
 
 def grasp_batch(origin: GraspOrigin, grasps: LabelledGrasps) -> GraspBatch:
@@ -172,25 +102,6 @@ def grasps_of(message: GraspBatch) -> tuple[GraspOrigin, LabelledGrasps]:
         proposal_names=tuple(message.proposal_names),
     )
     return origin, LabelledGrasps(**arrays)
-
-
-@dataclass(frozen=True)
-class ShownPads:
-    """Pads of some grasps of a shard, draped.
-
-    Attributes
-    ----------
-    grasp
-        Number of each grasp within its shard.
-    height_m
-        z(v) of S-1.07, in GCS.
-    pressure
-        p w_j of each triangle, 0 where it is not in contact.
-    """
-
-    grasp: Integer[np.ndarray, " k"]
-    height_m: Float[np.ndarray, "k v"]
-    pressure: Float[np.ndarray, "k t"]
 
 
 def pads_message(pads: ShownPads) -> DrapedPads:

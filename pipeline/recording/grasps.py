@@ -16,7 +16,7 @@ from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.transforms import invert
 from pipeline.gripper.pad import Pad
 from pipeline.labelling.balancing import quality_histogram
-from pipeline.messages.grasps import GraspOrigin, LabelledGrasps
+from pipeline.labelling.grasps import GraspOrigin, LabelledGrasps
 from pipeline.recording import colours
 from pipeline.recording.recording import looking, name_curve, numbered, step, time_panel
 from pipeline.recording.shapes import shown_mesh, shown_pose

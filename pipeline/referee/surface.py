@@ -6,8 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pipeline.referee.disc import Disc
-from pipeline.world.posed_bodies import PosedScene
-from pipeline.world.raycasting import RayScene
+from pipeline.world.raycasting import Surfaces
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +57,7 @@ def surface_of(
 def surface_under(
     disc: Disc,
     world_from_gripper: Float[np.ndarray, "4 4"],
-    scene: RayScene | PosedScene,
+    scene: Surfaces,
     target: int,
     clearance_m: float,
 ) -> tuple[Surface, Int[np.ndarray, " n"]]:
@@ -85,12 +84,8 @@ def surface_under(
     above = np.column_stack([disc.vertices_xy_m, np.full(len(disc.areas_m2), clearance_m)])
     origins = above @ rotation.T + world_from_gripper[:3, 3]
     down = np.broadcast_to(-rotation[:, 2], origins.shape)
-    if isinstance(scene, RayScene):
-        found = scene.cast(origins, down)
-        distance_m, body, normals = found.distance_m, found.body, scene.normals_at(found)
-    else:
-        seen = scene.cast(origins, down)
-        distance_m, body, normals = seen.distance_m, seen.body, seen.normals
+    hits = scene.cast(origins, down)
+    body, normals = hits.body, scene.normals_at(hits)
     local = np.where((body >= 0)[:, None], normals @ rotation, [0.0, 0.0, 1.0])
     local *= np.where(local[:, 2:] < 0.0, -1.0, 1.0)
-    return surface_of(disc, clearance_m - distance_m, local, body == target), body
+    return surface_of(disc, clearance_m - hits.distance_m, local, body == target), body

@@ -13,14 +13,14 @@ from jaxtyping import Float, Integer
 from pipeline.geometry.transforms import invert, transform_points
 from pipeline.sensing.depth_noise import disturb
 from pipeline.world.cameras import PinholeCamera
-from pipeline.world.posed_bodies import PosedScene
+from pipeline.world.raycasting import Surfaces
 from pipeline.world.view import CameraView, normal_map
 
 
 def measured(
     camera: PinholeCamera,
-    scene: PosedScene,
-    opaque: PosedScene | None,
+    scene: Surfaces,
+    opaque: Surfaces | None,
     rng: np.random.Generator | None,
 ) -> tuple[Float[np.ndarray, "h w"], Integer[np.ndarray, "h w"]]:
     """The depth image, 0 where nothing is measured, and the body that each pixel shows.
@@ -61,12 +61,12 @@ def _span(middle: float, half: float, size: int) -> tuple[int, int]:
     return first, last
 
 
-def _exact(camera: PinholeCamera, scene: PosedScene) -> CameraView:
+def _exact(camera: PinholeCamera, scene: Surfaces) -> CameraView:
     pose = camera.world_from_camera
     shape = (camera.height_px, camera.width_px)
     directions = _rays(*shape, camera.intrinsics, pose)
     hits = scene.cast(np.broadcast_to(pose[:3, 3], directions.shape), directions)
-    depth, normals = _seen(directions, hits.distance_m, hits.normals, pose)
+    depth, normals = _seen(directions, hits.distance_m, scene.normals_at(hits), pose)
     return CameraView(
         camera=camera,
         depth_m=depth.reshape(shape),

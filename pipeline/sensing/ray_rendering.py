@@ -11,9 +11,9 @@ from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.transforms import invert, rotate_vectors
 from pipeline.physics.appearance import body_colour, crease_normals
 from pipeline.world.cameras import PinholeCamera, pixel_rays
+from pipeline.world.posed_bodies import TABLE, bodies_at_rest, surfaces_at_rest
 from pipeline.world.raycasting import RayHits, RayScene
 from pipeline.world.scene import PlacedObject
-from pipeline.world.table import table_mesh
 from pipeline.world.view import CameraView, normal_map
 
 _TABLE_COLOUR = (0.5, 0.5, 0.48)  # a grey that no object has
@@ -27,7 +27,7 @@ class RayRenderer:
     name = "embree"
 
     def __init__(self, config: ScenesConfig) -> None:
-        self._table = table_mesh(config.table_side_m)
+        self._table_side_m = config.table_side_m
 
     def views(
         self,
@@ -36,26 +36,33 @@ class RayRenderer:
         cameras: Sequence[PinholeCamera],
     ) -> tuple[CameraView, ...]:
         """One exact view a camera."""
-        bodies = [objects[p.object_name].mesh.transformed(p.world_from_object) for p in placed]
-        bodies.append(self._table)
-        ids = np.array([*(p.body_id for p in placed), 0])
-        rays = RayScene(bodies)
-        return tuple(_view(rays, bodies, ids, camera) for camera in cameras)
+        meshes = {p.object_name: objects[p.object_name].mesh for p in placed}
+        bodies = bodies_at_rest(placed, meshes, self._table_side_m)
+        surfaces = surfaces_at_rest(bodies)
+        return tuple(_view(surfaces, bodies, camera) for camera in cameras)
 
 
-def _view(
-    rays: RayScene, bodies: Sequence[Mesh], ids: np.ndarray, camera: PinholeCamera
-) -> CameraView:
-    """Depth and segmentation by exact hits; colour by Lambert's law."""
+def _view(surfaces: RayScene, bodies: Mapping[int, Mesh], camera: PinholeCamera) -> CameraView:
+    """Depth and segmentation by exact hits; colour by Lambert's law.
+
+    Parameters
+    ----------
+    surfaces
+        What rays are cast at.
+    bodies
+        The same by body id, in WCS.
+    camera
+        Where the picture is taken from.
+    """
     shape = (camera.height_px, camera.width_px)
     origin, directions = pixel_rays(camera, np.ones(shape, dtype=bool))
-    hits = rays.cast(np.broadcast_to(origin, directions.shape), directions)
+    hits = surfaces.cast(np.broadcast_to(origin, directions.shape), directions)
     hit = hits.body >= 0
     distance = np.where(hit, hits.distance_m, 0.0)
     depth = distance * (directions @ camera.world_from_camera[:3, 2])
-    body = np.where(hit, ids[hits.body], 0)
-    normals = _shading_normals(rays, bodies, hits, origin + distance[:, None] * directions)
-    palette = np.array([_TABLE_COLOUR, *(body_colour(i) for i in range(1, int(ids.max()) + 1))])
+    body = np.maximum(hits.body, TABLE)
+    normals = _shading_normals(surfaces, bodies, hits, origin + distance[:, None] * directions)
+    palette = np.array([_TABLE_COLOUR, *(body_colour(i) for i in range(1, max(bodies) + 1))])
     light = np.clip(normals @ _LIGHT, 0.0, 1.0)
     shade = palette[body] * (_AMBIENT + _DIFFUSE * light)[:, None] * hit[:, None]
     in_camera = rotate_vectors(invert(camera.world_from_camera), normals)
@@ -71,13 +78,16 @@ def _view(
 
 
 def _shading_normals(
-    rays: RayScene, bodies: Sequence[Mesh], hits: RayHits, points_m: Float[np.ndarray, "n 3"]
+    surfaces: RayScene,
+    bodies: Mapping[int, Mesh],
+    hits: RayHits,
+    points_m: Float[np.ndarray, "n 3"],
 ) -> Float[np.ndarray, "n 3"]:
     """Unit normals in WCS, smooth but for creases, as the rasteriser has them; 0 where no hit."""
     normals = np.zeros((len(hits.body), 3))
-    weights = rays.barycentric_at(hits, points_m)
-    for index, mesh in enumerate(bodies):
-        rows = np.flatnonzero(hits.body == index)
+    weights = surfaces.barycentric_at(hits, points_m)
+    for body_id, mesh in bodies.items():
+        rows = np.flatnonzero(hits.body == body_id)
         corners = crease_normals(mesh)[hits.triangle[rows]]
         mixed = np.einsum("nk,nkj->nj", weights[rows], corners)
         normals[rows] = mixed / np.linalg.norm(mixed, axis=1, keepdims=True)

@@ -15,9 +15,9 @@ from pipeline.config import RunConfig
 from pipeline.control.robot import Reading, State
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.compiled_poses import turn_between, turned
-from pipeline.gripper import label_batch
 from pipeline.gripper.pad import Pad
 from pipeline.labelling.heights import pad_heights
+from pipeline.labelling.poses import label_poses
 from pipeline.physics.engine import Body
 from pipeline.simulation.floating import Mover
 from pipeline.simulation.suction import Holding, holding
@@ -157,8 +157,8 @@ class SuctionGripper:
             )
             if found.pressure > best.pressure:
                 best, self.target = found, body_id
-                label = label_batch(self._pad, self._config.gripper, heights, on_target)
-                self.reached_quality = float(label.q[0])
+        if self.target:
+            self.reached_quality = self._quality_at(pose, self.target)
         self.seal_pressure = best.pressure
         if self.target and best.pressure >= self._config.evaluate.suction.seal_min:
             body, item = self._bodies[self.target], self._objects[self.target]
@@ -201,6 +201,13 @@ class SuctionGripper:
     def surfaces(self) -> PosedScene:
         """The true surfaces where they are now."""
         return self._surfaces.at({i: b.world_from_object for i, b in self._bodies.items()})
+
+    def _quality_at(self, pose: Float[np.ndarray, "4 4"], target: int) -> float:
+        """q of Algorithm 1 on the true surfaces, for a body at a pose of the gripper."""
+        label = label_poses(
+            pose[None], np.array([target]), self.surfaces(), self._config.gripper, self._reach_m()
+        )
+        return float(label.q[0])
 
     def _stopped_by_touch(
         self, target: Float[np.ndarray, "4 4"], speed_m_s: float

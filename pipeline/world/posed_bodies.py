@@ -4,8 +4,7 @@ Each body keeps its own `RayScene` in its own frame, made once: moving one costs
 a scene in the world's frame would be built anew. Rays are sorted out by bounding spheres first.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 
 import numba
@@ -14,23 +13,34 @@ from jaxtyping import Float, Int
 
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.transforms import invert, transform_points
-from pipeline.world.raycasting import RayScene
+from pipeline.world.raycasting import RayHits, RayScene
+from pipeline.world.scene import PlacedObject
+from pipeline.world.table import table_mesh
 
 TABLE = 0
-NOTHING = -1
 
 
-@dataclass(frozen=True, eq=False)
-class PosedHits:
-    """First hit of each ray; arrays of one length n.
+def bodies_at_rest(
+    placed: Sequence[PlacedObject], meshes: Mapping[str, Mesh], table_side_m: float
+) -> dict[int, Mesh]:
+    """The objects of a scene and its table, in WCS, by body id.
 
-    distance_m : inf where nothing is hit. body : id of the body hit, 0 the table, -1 nothing.
-    normals : unit, outward, in WCS; zero where nothing is hit.
+    Parameters
+    ----------
+    placed
+        The objects and their poses.
+    meshes
+        Surface of each object by its name, in the object's own frame [m].
+    table_side_m
+        Side of the square table at z = 0 [m].
     """
+    bodies = {p.body_id: meshes[p.object_name].transformed(p.world_from_object) for p in placed}
+    return bodies | {TABLE: table_mesh(table_side_m)}
 
-    distance_m: Float[np.ndarray, " n"]
-    body: Int[np.ndarray, " n"]
-    normals: Float[np.ndarray, "n 3"]
+
+def surfaces_at_rest(bodies: Mapping[int, Mesh]) -> RayScene:
+    """Bodies that stay where they are, ready for rays; hits name them by their ids."""
+    return RayScene(list(bodies.values()), list(bodies))
 
 
 class PosedBodies:
@@ -46,7 +56,7 @@ class PosedBodies:
 
 
 class PosedScene:
-    """Bodies where they are; `cast` as in `RayScene`."""
+    """Bodies where they are: `cast` and `normals_at` as those of `RayScene`, by body id."""
 
     def __init__(
         self, bodies: Mapping[int, tuple[Mesh, Float[np.ndarray, "4 4"]]], table_half_m: float
@@ -56,28 +66,47 @@ class PosedScene:
 
     def cast(
         self, origins_m: Float[np.ndarray, "n 3"], directions: Float[np.ndarray, "n 3"]
-    ) -> PosedHits:
-        """First hit of each ray. directions : unit length."""
+    ) -> RayHits:
+        """First hit of each ray with a body or the table.
+
+        Parameters
+        ----------
+        origins_m
+            Where rays begin in WCS, shape (n, 3) [m].
+        directions
+            Unit directions in WCS, shape (n, 3).
+
+        Returns
+        -------
+        Hits with the body's id, 0 for the table, -1 for nothing; the table has no triangles, its
+        ``triangle`` is -1.
+        """
         origins = np.ascontiguousarray(origins_m, dtype=np.float64)
         rays = np.ascontiguousarray(directions, dtype=np.float64)
-        distance, body, normals = _table_hits(origins, rays, self._half_m)
+        distance, body = _table_hits(origins, rays, self._half_m)
+        triangle = np.full(len(origins), -1, dtype=np.int64)
         for body_id, (mesh, pose) in sorted(self._bodies.items()):
             scene, centre, radius = _own_scene(mesh)
             near = _meeting(origins, rays, transform_points(pose, centre), radius)
             if len(near) == 0:
                 continue
             hits = scene.cast(*_in_frame(invert(pose), origins, rays, near))
-            _take_nearer(
-                near,
-                hits.distance_m,
-                scene.normals_at(hits),
-                pose,
-                body_id,
-                distance,
-                body,
-                normals,
+            _take_nearer(near, hits.distance_m, hits.triangle, body_id, distance, body, triangle)
+        return RayHits(distance, body, triangle)
+
+    def normals_at(self, hits: RayHits) -> Float[np.ndarray, "n 3"]:
+        """Unit outward normal, in WCS, of the surface each ray hit; NaN where nothing was hit."""
+        normals = np.full((len(hits.body), 3), np.nan)
+        normals[hits.body == TABLE] = [0.0, 0.0, 1.0]
+        for body_id, (mesh, pose) in self._bodies.items():
+            rows = np.flatnonzero(hits.body == body_id)
+            if len(rows) == 0:
+                continue
+            of_body = RayHits(
+                hits.distance_m[rows], np.zeros_like(hits.body[rows]), hits.triangle[rows]
             )
-        return PosedHits(distance, body, normals)
+            normals[rows] = _turned(pose, _own_scene(mesh)[0].normals_at(of_body))
+        return normals
 
 
 @lru_cache(maxsize=512)
@@ -91,10 +120,10 @@ def _own_scene(mesh: Mesh) -> tuple[RayScene, Float[np.ndarray, " 3"], float]:
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]
 def _table_hits(
     origins: Float[np.ndarray, "n 3"], rays: Float[np.ndarray, "n 3"], half: float
-) -> tuple[Float[np.ndarray, " n"], Int[np.ndarray, " n"], Float[np.ndarray, "n 3"]]:
+) -> tuple[Float[np.ndarray, " n"], Int[np.ndarray, " n"]]:
+    """Distance to the table and its id, or inf and -1."""
     distance = np.full(len(origins), np.inf)
     body = np.full(len(origins), -1, dtype=np.int64)
-    normals = np.zeros((len(origins), 3))
     for i in range(len(origins)):
         if rays[i, 2] == 0.0:
             continue
@@ -103,8 +132,7 @@ def _table_hits(
         if t >= 0.0 and abs(x) <= half and abs(y) <= half:
             distance[i] = t
             body[i] = 0
-            normals[i, 2] = 1.0
-    return distance, body, normals
+    return distance, body
 
 
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]
@@ -157,12 +185,11 @@ def _in_frame(
 def _take_nearer(
     rows: Int[np.ndarray, " k"],
     hit_m: Float[np.ndarray, " k"],
-    hit_normals: Float[np.ndarray, "k 3"],
-    pose: Float[np.ndarray, "4 4"],
+    hit_triangle: Int[np.ndarray, " k"],
     body_id: int,
     distance: Float[np.ndarray, " n"],
     body: Int[np.ndarray, " n"],
-    normals: Float[np.ndarray, "n 3"],
+    triangle: Int[np.ndarray, " n"],
 ) -> None:
     """Keep a body's hits where they are nearer than what is known."""
     for k in range(len(rows)):
@@ -170,9 +197,20 @@ def _take_nearer(
         if hit_m[k] < distance[i]:
             distance[i] = hit_m[k]
             body[i] = body_id
-            for axis in range(3):
-                normals[i, axis] = (
-                    pose[axis, 0] * hit_normals[k, 0]
-                    + pose[axis, 1] * hit_normals[k, 1]
-                    + pose[axis, 2] * hit_normals[k, 2]
-                )
+            triangle[i] = hit_triangle[k]
+
+
+@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+def _turned(
+    pose: Float[np.ndarray, "4 4"], vectors: Float[np.ndarray, "k 3"]
+) -> Float[np.ndarray, "k 3"]:
+    """`transforms.rotate_vectors`, whose last bits depend on how many vectors it is given."""
+    turned = np.empty_like(vectors)
+    for k in range(len(vectors)):
+        for axis in range(3):
+            turned[k, axis] = (
+                pose[axis, 0] * vectors[k, 0]
+                + pose[axis, 1] * vectors[k, 1]
+                + pose[axis, 2] * vectors[k, 2]
+            )
+    return turned

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numba
 import numpy as np
@@ -25,22 +26,52 @@ class RayHits:
     distance_m: Float[np.ndarray, " n"]
     """From the ray's origin along its direction [m]; inf where nothing is hit."""
     body: Int[np.ndarray, " n"]
-    """Index of the body hit; -1 where nothing is hit."""
+    """Number of the body hit: its index in the scene, or its id where the scene has ids; -1 where
+    nothing is hit."""
     triangle: Int[np.ndarray, " n"]
     """Index of the face within that body's mesh; -1 where nothing is hit."""
+
+
+class Surfaces(Protocol):
+    """Bodies' surfaces that rays can be cast at: at rest (`RayScene`) or posed anew
+    (`posed_bodies.PosedScene`)."""
+
+    def cast(
+        self, origins_m: Float[np.ndarray, "n 3"], directions: Float[np.ndarray, "n 3"]
+    ) -> RayHits:
+        """First hit of each ray."""
+        ...
+
+    def normals_at(self, hits: RayHits) -> Float[np.ndarray, "n 3"]:
+        """Unit outward normal where each ray hit; NaN where nothing was hit."""
+        ...
 
 
 class RayScene:
     """Triangle surfaces of several bodies, all in one frame, ready for ray casting.
 
-    bodies: meshes in the scene's frame (usually the world). The scene is fixed: build another
-    when a body moves. Raises ValueError when there is not one triangle.
+    The scene is fixed: build another when a body moves.
+
+    Parameters
+    ----------
+    bodies
+        Meshes in the scene's frame, usually the world.
+    body_ids
+        By what number `RayHits` names each body: distinct, not negative. Left out, its index.
+
+    Raises
+    ------
+    ValueError
+        There is not one triangle, or the ids do not fit the bodies.
     """
 
-    def __init__(self, bodies: Sequence[Mesh]) -> None:
+    def __init__(self, bodies: Sequence[Mesh], body_ids: Sequence[int] | None = None) -> None:
         counts = [len(body.faces) for body in bodies]
         if sum(counts) == 0:
             raise ValueError("a ray scene needs at least one triangle")
+        ids = np.arange(len(bodies)) if body_ids is None else np.asarray(body_ids, dtype=np.int64)
+        if len(ids) != len(bodies) or len(np.unique(ids)) != len(ids) or ids.min() < 0:
+            raise ValueError(f"{len(bodies)} bodies need as many distinct ids from 0, got {ids}")
         offsets = np.cumsum([0, *(len(body.vertices_m) for body in bodies)])[:-1]
         vertices = np.concatenate([body.vertices_m for body in bodies]).astype(np.float64)
         faces = np.concatenate(
@@ -50,8 +81,9 @@ class RayScene:
         self._centre = (lower + upper) / 2
         self._scale = _EMBREE_EXTENT / max(float(np.max(upper - lower)), 1e-12)
         self._corners = np.ascontiguousarray(vertices[faces])
-        self._body_of_face = np.repeat(np.arange(len(bodies)), counts)
-        self._first_face = np.cumsum([0, *counts])[:-1]
+        self._body_of_face = np.repeat(ids, counts)
+        self._first_face = np.zeros(int(ids.max()) + 1, dtype=np.int64)  # by body id
+        self._first_face[ids] = np.cumsum([0, *counts])[:-1]
         self._embree = rtcore_scene.EmbreeScene(robust=True)
         TriangleMesh(
             scene=self._embree,

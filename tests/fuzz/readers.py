@@ -24,7 +24,8 @@ from pipeline.errors import SoftgripError
 from pipeline.geometry.mesh_files import load_mesh_file
 from pipeline.geometry.mesh_folders import MESH_SUFFIXES
 from pipeline.geometry.urdf_files import load_object_file
-from pipeline.messages.grasps import GraspOrigin, LabelledGrasps, grasp_batch, grasps_of
+from pipeline.labelling.grasps import GraspOrigin, LabelledGrasps
+from pipeline.messages.grasps import grasp_batch, grasps_of
 from pipeline.messages.objects import object_of
 from pipeline.messages.samples import sample_batch, samples_of
 from pipeline.messages.training import CHECKPOINT, EXPORT

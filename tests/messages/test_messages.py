@@ -16,10 +16,9 @@ from pipeline.artifacts.sharding import (
     write_index,
 )
 from pipeline.errors import ArtifactError
+from pipeline.labelling.grasps import GraspOrigin, LabelledGrasps
+from pipeline.labelling.shown_pads import ShownPads
 from pipeline.messages.grasps import (
-    GraspOrigin,
-    LabelledGrasps,
-    ShownPads,
     grasp_batch,
     grasps_of,
     pads_message,

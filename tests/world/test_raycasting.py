@@ -134,3 +134,17 @@ def test_agrees_with_the_native_trimesh_caster_on_a_scanned_mesh() -> None:
     expected = np.full(60, np.inf)
     expected[ray] = np.linalg.norm(points - origins[ray], axis=1)
     np.testing.assert_allclose(hits.distance_m, expected, rtol=1e-7)
+
+
+def test_hits_name_bodies_by_their_ids_where_a_scene_has_ids() -> None:
+    """The nearer and the farther of two boxes, numbered 7 and 3."""
+    near = mesh_of(trimesh.creation.box((0.1, 0.1, 0.1)))
+    far = Mesh(near.vertices_m - [0.3, 0.0, 0.0], near.faces)
+    scene = RayScene([far, near], [3, 7])
+    origins = np.array([[0.0, 0.01, 1.0], [-0.3, 0.01, 1.0], [5.0, 0.0, 1.0]])
+    hits = scene.cast(origins, np.array([0.0, 0.0, -1.0]))
+    assert hits.body.tolist() == [7, 3, -1]
+    np.testing.assert_allclose(scene.normals_at(hits)[:2], [[0, 0, 1], [0, 0, 1]], atol=1e-12)
+    for ids in ([1], [1, 1], [-1, 2]):
+        with pytest.raises(ValueError, match="distinct ids"):
+            RayScene([far, near], ids)

@@ -1,0 +1,56 @@
+"""Labels at given poses on given surfaces: S-1.07 - S-1.12, whoever chose the poses."""
+
+from functools import lru_cache
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from pipeline.config.grasps import GripperConfig, PadConfig
+from pipeline.gripper import LabelBatch, Pad, build_pad, label_batch
+from pipeline.labelling.heights import pad_heights
+from pipeline.world.raycasting import Surfaces
+
+ROUND = 512  # grasps labelled at once: bounds the memory of their rays
+
+
+@lru_cache(maxsize=4)
+def pad_of(config: PadConfig) -> Pad:
+    """S-1.02, S-1.03: the pad in GCS, within Table I's steps, built once a process."""
+    return build_pad(config)
+
+
+def label_poses(
+    world_from_gripper: Float[np.ndarray, "n 4 4"],
+    body_id: Int[np.ndarray, " n"],
+    surfaces: Surfaces,
+    config: GripperConfig,
+    clearance_m: float,
+) -> LabelBatch:
+    """Label grasps where they are: the pad's heights by rays, then `label_batch`.
+
+    Parameters
+    ----------
+    world_from_gripper
+        Pose of each grasp in the frame of ``surfaces``, shape (n, 4, 4): origin anywhere on the
+        approach, +z out of the object.
+    body_id
+        The body each grasp is meant to hold, shape (n,), as ``surfaces`` numbers it. What else
+        lies under the pad holds it up and does not seal.
+    surfaces
+        The true surfaces.
+    config
+        The gripper.
+    clearance_m
+        How far above the origin rays begin [m]: what lies higher is not met.
+
+    Returns
+    -------
+    One row a grasp.
+    """
+    pad = pad_of(config.pad)
+    parts = []
+    for start in range(0, max(len(world_from_gripper), 1), ROUND):
+        rows = slice(start, start + ROUND)
+        heights, below = pad_heights(world_from_gripper[rows], surfaces, pad, clearance_m)
+        parts.append(label_batch(pad, config, heights, below == body_id[rows, None]))
+    return LabelBatch.joined(parts)

@@ -1,0 +1,176 @@
+"""Algorithm 1 on a scene: every object, from every viewpoint that sees one."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.config import RunConfig
+from pipeline.errors import SceneError
+from pipeline.geometry.mesh import Mesh
+from pipeline.gripper import GraspStatus
+from pipeline.gripper.limits import LIMIT_NAMES
+from pipeline.labelling.clouds import Picture, clouds_around, measured_pictures
+from pipeline.labelling.grasps import GraspOrigin, LabelledGrasps
+from pipeline.labelling.rounds import KeptGrasps, kept_grasps, spread_evenly
+from pipeline.labelling.sampling import Proposal, VisibleSurface
+from pipeline.world.cameras import pixel_rays, shown_whole
+from pipeline.world.posed_bodies import bodies_at_rest, surfaces_at_rest
+from pipeline.world.raycasting import RayScene, Surfaces
+from pipeline.world.scene import ClutterScene
+from pipeline.world.view import CameraView
+
+
+def scene_surfaces(
+    scene: ClutterScene, meshes: Mapping[str, Mesh], table_side_m: float
+) -> RayScene:
+    """The true surfaces of a scene's objects and its table, in WCS.
+
+    S-1.01, each object's pose in SE(3), is where physics left it.
+
+    Parameters
+    ----------
+    scene
+        What lies where.
+    meshes
+        Surface of each object by its name, in the object's own frame [m].
+    table_side_m
+        Side of the table, ``scenes.table_side_m`` [m].
+    """
+    return surfaces_at_rest(bodies_at_rest(scene.objects, meshes, table_side_m))
+
+
+def label_scene(
+    scene: ClutterScene,
+    surfaces: Surfaces,
+    config: RunConfig,
+    wanted: int,
+    rng: np.random.Generator,
+) -> list[tuple[GraspOrigin, LabelledGrasps]]:
+    """Algorithm 1 on every object of a scene, from each of its viewpoints.
+
+    Parameters
+    ----------
+    scene
+        Objects, their poses, and what its cameras saw.
+    surfaces
+        Its true surfaces, by `scene_surfaces`.
+    config
+        Sections grasps, gripper and sensing.
+    wanted
+        How many grasps to keep, over all viewpoints.
+    rng
+        Draws the sensors' noise, proposals, and what is kept.
+
+    Returns
+    -------
+    Kept grasps, a batch for each viewpoint that sees a place to try.
+
+    Raises
+    ------
+    SceneError
+        No camera sees a surface face on and whole in its picture.
+    """
+    names = tuple(sorted({item.object_name for item in scene.objects}))
+    measured = measured_pictures(scene.views, config.sensing.disturbed, rng)
+    seen = [visible_surface(view, surfaces, config.gripper.pad.radius_m) for view in scene.views]
+    able = [
+        number
+        for number, surface in enumerate(seen)
+        if len(surface.contacts(config.grasps.seen_angle_max_rad))
+    ]
+    if not able:
+        raise SceneError(
+            f"No camera of scene {scene.scene_id} sees a surface face on and whole in its picture",
+            "Raise grasps.seen_angle_max_rad, or change where the cameras stand",
+        )
+    index_of_body = np.zeros(1 + max(item.body_id for item in scene.objects), dtype=np.int64)
+    for item in scene.objects:
+        index_of_body[item.body_id] = names.index(item.object_name)
+    batches = []
+    for number, share in zip(able, spread_evenly(wanted, len(able)), strict=True):
+        kept = kept_grasps(seen[number], surfaces, config, share, rng)
+        grasps = with_clouds(kept, measured[number], measured, config, rng)
+        origin = origin_of(scene, scene.views[number].camera.name, names)
+        batches.append((origin, replace(grasps, object_index=index_of_body[grasps.body_id])))
+    return batches
+
+
+def visible_surface(view: CameraView, surfaces: Surfaces, radius_m: float) -> VisibleSurface:
+    """What the camera sees of the objects: exact points and normals under its pixels.
+
+    Parameters
+    ----------
+    view
+        An exact picture of the scene.
+    surfaces
+        The true surfaces; the table is body 0.
+    radius_m
+        How far around a contact the picture must show the scene, r_G [m].
+
+    Raises
+    ------
+    SceneError
+        The camera sees no object.
+    """
+    origin, directions = pixel_rays(view.camera, view.segmentation > 0)
+    hits = surfaces.cast(np.broadcast_to(origin, directions.shape), directions)
+    seen = hits.body > 0
+    if not seen.any():
+        raise SceneError(
+            f"Camera {view.camera.name} sees no object",
+            "Change cameras.static.elevations_rad or azimuths_rad",
+        )
+    points = origin + hits.distance_m[seen, None] * directions[seen]
+    whole = shown_whole(view.camera, points, radius_m)
+    normals = surfaces.normals_at(hits)[seen]
+    return VisibleSurface(points, normals, hits.body[seen], origin, whole)
+
+
+def with_clouds(
+    kept: KeptGrasps,
+    picture: Picture,
+    pictures: list[Picture],
+    config: RunConfig,
+    rng: np.random.Generator,
+) -> LabelledGrasps:
+    """Kept grasps with the clouds around them; see `clouds_around`. No object has an index yet."""
+    candidates, labels = kept.candidates, kept.labels
+    frames = candidates.world_from_contact
+    cloud, mask, pictures_of_cloud = clouds_around(frames, picture, pictures, config, rng)
+    first_touch = frames.copy()
+    first_touch[:, :3, 3] += labels.touch_height_m[:, None] * first_touch[:, :3, 2]
+    return LabelledGrasps(
+        object_index=np.zeros_like(candidates.body_id),
+        body_id=candidates.body_id,
+        world_from_gripper=first_touch,
+        quality=labels.q,
+        pressure=labels.pressure,
+        wrench=labels.wrench,
+        limit_slack=labels.slacks,
+        weight_summary=labels.weights,
+        contact_mask=labels.contact,
+        status=labels.status - min(GraspStatus),
+        iterations=labels.iterations,
+        tilt_rad=candidates.tilt_rad,
+        proposal=candidates.proposal,
+        keep_probability=kept.keep_probability,
+        cloud=cloud,
+        cloud_mask=mask,
+        touch_height_m=labels.touch_height_m,
+        pictures=pictures_of_cloud,
+    )
+
+
+def origin_of(scene: ClutterScene, viewpoint: str, names: tuple[str, ...]) -> GraspOrigin:
+    """What the grasps of one viewpoint have in common; ``names`` of the scene's objects."""
+    return GraspOrigin(
+        scene_id=scene.scene_id,
+        viewpoint=viewpoint,
+        level=scene.level,
+        split=scene.split,
+        object_names=names,
+        limit_names=LIMIT_NAMES,
+        status_names=tuple(status.name.lower() for status in GraspStatus),
+        proposal_names=tuple(proposal.name.lower() for proposal in Proposal),
+    )

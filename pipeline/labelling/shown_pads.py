@@ -1,0 +1,65 @@
+"""Pads of some labelled grasps, draped again, for a recording to show."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int, Integer
+
+from pipeline.config import RunConfig
+from pipeline.gripper.draping import drape
+from pipeline.gripper.quality import triangle_pressure
+from pipeline.labelling.grasps import LabelledGrasps
+from pipeline.labelling.heights import pad_heights
+from pipeline.labelling.poses import pad_of
+from pipeline.world.raycasting import Surfaces
+
+
+@dataclass(frozen=True)
+class ShownPads:
+    """Pads of some grasps of a shard, draped.
+
+    Attributes
+    ----------
+    grasp
+        Number of each grasp within its shard.
+    height_m
+        z(v) of S-1.07, in GCS.
+    pressure
+        p w_j of each triangle, 0 where it is not in contact.
+    """
+
+    grasp: Integer[np.ndarray, " k"]
+    height_m: Float[np.ndarray, "k v"]
+    pressure: Float[np.ndarray, "k t"]
+
+
+def drape_again(
+    batches: Sequence[LabelledGrasps],
+    chosen: Int[np.ndarray, " k"],
+    surfaces: Surfaces,
+    config: RunConfig,
+) -> ShownPads:
+    """The pads of chosen grasps of one scene, as they lay when they were labelled.
+
+    Parameters
+    ----------
+    batches
+        All grasps of the scene, in their order.
+    chosen
+        Numbers of k of them, counted over all batches, shape (k,).
+    surfaces
+        The true surfaces of the scene.
+    config
+        Sections grasps and gripper.
+    """
+    pad, gripper = pad_of(config.gripper.pad), config.gripper
+    frames = np.concatenate([grasps.world_from_gripper for grasps in batches])[chosen]
+    contact = np.concatenate([grasps.contact_mask for grasps in batches])[chosen]
+    heights, _ = pad_heights(frames, surfaces, pad, config.grasps.clearance_m)
+    draped = drape(pad, heights)
+    pressure = [
+        triangle_pressure(pad, gripper, z, touching)
+        for z, touching in zip(draped, contact, strict=True)
+    ]
+    return ShownPads(chosen, draped, np.array(pressure))
