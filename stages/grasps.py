@@ -43,7 +43,7 @@ from schemas.softgrip.v1.grasps_pb2 import DrapedPads, GraspBatch
 from stages.graph import GRASPS, inputs_of
 
 TOPIC, PADS_TOPIC = "/grasps", "/pads"
-RECORDED_SCENES = 4
+RECORDED_SCENES = 4  # spread over the run: more make the recording slow to open
 
 
 @dataclass(frozen=True)

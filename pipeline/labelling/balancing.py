@@ -11,7 +11,7 @@ from jaxtyping import Float, Int, Integer
 
 from pipeline.labelling.sampling import Proposal
 
-TENTHS = 10
+TENTHS = 10  # bins of q that labels are balanced over
 
 
 def tenth_of(quality: Float[np.ndarray, " n"]) -> Int[np.ndarray, " n"]:

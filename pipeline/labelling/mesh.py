@@ -14,7 +14,7 @@ from pipeline.gripper import LabelBatch
 from pipeline.labelling.poses import label_poses
 from pipeline.world.raycasting import RayScene
 
-_BODY = 0
+_BODY = 0  # the mesh is the only body
 # Poses read from text or single precision differ from rigid ones by about this much.
 _RIGID_WITHIN = 1e-5
 

@@ -17,7 +17,7 @@ from pipeline.world.raycasting import RayHits, RayScene
 from pipeline.world.scene import PlacedObject
 from pipeline.world.table import table_mesh
 
-TABLE = 0
+TABLE = 0  # segmentation holds 0 where no object is
 
 
 def bodies_at_rest(
