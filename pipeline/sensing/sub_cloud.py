@@ -33,7 +33,7 @@ def sub_clouds(
 
 
 def merged_sub_clouds(
-    pictures: Sequence[tuple[Float[np.ndarray, "h w"], PinholeCamera]],
+    pictures: Sequence[tuple[Float[np.ndarray, "_ _"], PinholeCamera]],
     world_from_contact: Float[np.ndarray, "b 4 4"],
     config: SensingConfig,
     radius_m: float,
