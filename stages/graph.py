@@ -39,9 +39,11 @@ SCENES = Stage(
 )
 GRASPS = Stage(
     "grasps",
+    # Draped pads for the recording lie in the shards: their number decides bytes.
     ("seed", "gripper", "sensing", "grasps", "recording.grasps"),
     ("objects", "scenes"),
     sharded=True,
+    drawn_apart=True,
 )
 SHARDS = Stage(
     "shards",

@@ -27,23 +27,19 @@ from pipeline.execution import (
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.labelling.balancing import quality_histogram
 from pipeline.labelling.grasps import LabelledGrasps
-from pipeline.labelling.poses import pad_of
 from pipeline.labelling.scene import label_scene, scene_surfaces
-from pipeline.labelling.shown_pads import ShownPads, drape_again
-from pipeline.messages.grasps import grasp_batch, grasps_of, pads_message, pads_of
+from pipeline.labelling.shown_pads import SHOWN_SCENES, ShownPads, drape_again
+from pipeline.messages.grasps import grasp_batch, grasps_of, pads_message
 from pipeline.messages.objects import read_objects
-from pipeline.messages.scenes import read_placed, read_scene, scene_count
-from pipeline.recording.grasps import ShownGrasp, blueprint, show_grasps
-from pipeline.recording.recording import recording
+from pipeline.messages.scenes import read_scene, scene_count
+from pipeline.recording.grasps import draw_grasps
 from pipeline.spread import spread
 from pipeline.stopwatch import Stopwatch
 from pipeline.world.raycasting import RayScene
-from pipeline.world.scene import PlacedObject
-from schemas.softgrip.v1.grasps_pb2 import DrapedPads, GraspBatch
+from schemas.softgrip.v1.grasps_pb2 import GraspBatch
 from stages.graph import GRASPS, inputs_of
 
 TOPIC, PADS_TOPIC = "/grasps", "/pads"
-RECORDED_SCENES = 4  # spread over the run: more make the recording slow to open
 
 
 @dataclass(frozen=True)
@@ -77,7 +73,7 @@ def build(stage: StageContext) -> Summary:
     scenes = stage.upstream("scenes")
     count = scene_count(scenes)
     share, more = divmod(stage.config.grasps.count, count)
-    recorded = spread(count, RECORDED_SCENES)
+    recorded = spread(count, SHOWN_SCENES)
     pads = max(1, stage.config.recording.grasps // len(recorded))
     jobs = [
         ShardJob(
@@ -96,7 +92,6 @@ def build(stage: StageContext) -> Summary:
     results = list(progress(done, count, "grasps", "scene"))
     quality = np.concatenate([result.quality for result in results])
     stage.drawing.seconds += sum(result.recording_s for result in results)
-    record(stage, {index: results[index].shard for index in recorded}, quality)
     entries = [shard_entry(r.shard, stage.output.parent, len(r.quality), r.split) for r in results]
     write_index(stage.output, stage.provenance(), entries, quality_histogram(quality))
     return summary(results, quality)
@@ -156,30 +151,6 @@ def examined(shard: Path) -> ShardResult:
     return ShardResult(shard, split, np.concatenate(quality), tuple(sorted(names)), dict(status))
 
 
-def record(stage: StageContext, shards: dict[int, Path], quality: np.ndarray) -> None:
-    """The recording: grasps of some scenes by their index, spread over their labels."""
-    meshes = {n: item.mesh for n, (item, _) in catalogue(stage.upstream("objects")).items()}
-    with recording(stage, blueprint()) as stream:
-        shown: list[ShownGrasp] = []
-        for index, shard in shards.items():
-            placed = read_placed(stage.upstream("scenes"), index)
-            shown += shown_grasps(placed, shard)
-        show_grasps(stream, shown, meshes, pad_of(stage.config.gripper.pad), quality)
-
-
-def shown_grasps(placed: tuple[PlacedObject, ...], shard: Path) -> list[ShownGrasp]:
-    """The grasps of a shard that have their pads in it."""
-    with open_artifact(shard) as artifact:
-        batches = [grasps_of(message) for _, message in artifact.messages(GraspBatch)]
-        pads = pads_of(artifact.one(DrapedPads))
-    rows = [(origin, batch, row) for origin, batch in batches for row in range(len(batch))]
-    shown = []
-    for number, height, pressure in zip(pads.grasp, pads.height_m, pads.pressure, strict=True):
-        origin, grasps, row = rows[number]
-        shown.append(ShownGrasp(placed, origin, grasps, row, height, pressure))
-    return shown
-
-
 def summary(results: list[ShardResult], quality: np.ndarray) -> Summary:
     """The stage's headline figures."""
     status: Counter[str] = Counter()
@@ -195,4 +166,4 @@ def summary(results: list[ShardResult], quality: np.ndarray) -> Summary:
 
 
 if __name__ == "__main__":
-    stage_command(GRASPS, build, inputs_of)
+    stage_command(GRASPS, build, inputs_of, draw=draw_grasps)

@@ -14,6 +14,9 @@ from pipeline.labelling.heights import pad_heights
 from pipeline.labelling.poses import pad_of
 from pipeline.world.raycasting import Surfaces
 
+# Scenes, spread over the run, whose shards hold draped pads: more make a recording slow to open.
+SHOWN_SCENES = 4
+
 
 @dataclass(frozen=True)
 class ShownPads:

@@ -6,21 +6,39 @@ first touch, +z out along the approach), so that grasps can be compared by eye.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
+from pipeline.artifacts import from_tensor, open_artifact
+from pipeline.artifacts.sharding import read_index
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.transforms import invert
 from pipeline.gripper.pad import Pad
-from pipeline.labelling.balancing import quality_histogram
 from pipeline.labelling.grasps import GraspOrigin, LabelledGrasps
+from pipeline.labelling.poses import pad_of
+from pipeline.labelling.shown_pads import SHOWN_SCENES
+from pipeline.messages.grasps import grasps_of, pads_of
+from pipeline.messages.objects import read_objects
+from pipeline.messages.scenes import read_placed
 from pipeline.recording import colours
-from pipeline.recording.recording import looking, name_curve, numbered, step, time_panel
+from pipeline.recording.recording import (
+    MadeStage,
+    looking,
+    name_curve,
+    numbered,
+    recording,
+    step,
+    time_panel,
+)
 from pipeline.recording.shapes import shown_mesh, shown_pose
+from pipeline.spread import spread
 from pipeline.world.scene import PlacedObject
+from schemas.softgrip.v1.grasps_pb2 import DrapedPads, GraspBatch
 
 TIMELINE = "grasp"
 FULL_PRESSURE = 1.1  # p w_j of a full seal where w_j is greatest, with sigma_W of Eq. (13)
@@ -57,6 +75,33 @@ class ShownGrasp:
     pad_pressure: Float[np.ndarray, " t"]
 
 
+def draw_grasps(stage: MadeStage, figures: Mapping[str, Any]) -> None:
+    """Draw the recording from the finished shards that hold draped pads."""
+    objects = read_objects(stage.upstream("objects"))
+    meshes = {name: item.mesh for name, (item, _) in objects.items()}
+    index = read_index(stage.output)
+    shown: list[ShownGrasp] = []
+    for scene in spread(len(index.shards), SHOWN_SCENES):
+        placed = read_placed(stage.upstream("scenes"), scene)
+        shown += shown_grasps(placed, stage.output.parent / index.shards[scene].path)
+    with recording(stage, blueprint()) as stream:
+        histogram = from_tensor(index.quality_histogram)
+        show_grasps(stream, shown, meshes, pad_of(stage.config.gripper.pad), histogram)
+
+
+def shown_grasps(placed: tuple[PlacedObject, ...], shard: Path) -> list[ShownGrasp]:
+    """The grasps of a shard that have their pads in it."""
+    with open_artifact(shard) as artifact:
+        batches = [grasps_of(message) for _, message in artifact.messages(GraspBatch)]
+        pads = pads_of(artifact.one(DrapedPads))
+    rows = [(origin, batch, row) for origin, batch in batches for row in range(len(batch))]
+    shown = []
+    for number, height_m, pressure in zip(pads.grasp, pads.height_m, pads.pressure, strict=True):
+        origin, grasps, row = rows[number]
+        shown.append(ShownGrasp(placed, origin, grasps, row, height_m, pressure))
+    return shown
+
+
 def blueprint() -> rrb.Blueprint:
     """Opens on the best grasp: the pad on its object beside figures and limits."""
     return rrb.Blueprint(
@@ -87,10 +132,10 @@ def show_grasps(
     grasps: Sequence[ShownGrasp],
     meshes: Mapping[str, Mesh],
     pad: Pad,
-    quality: Float[np.ndarray, " n"],
+    histogram: Int[np.ndarray, " tenths"],
 ) -> None:
-    """Log the grasps from the best to the worst; ``quality`` are the labels of all grasps."""
-    stream.log("curves/quality", rr.BarChart(quality_histogram(quality)), static=True)
+    """Log the grasps from the best to the worst; ``histogram`` counts q of all in tenths."""
+    stream.log("curves/quality", rr.BarChart(histogram), static=True)
     name_curve(stream, "curves/label/q", "q", colours.PALETTE[2])
     name_curve(stream, "curves/label/p", "p", colours.PALETTE[1])
     ordered = sorted(grasps, key=lambda shown: -shown.grasps.quality[shown.row])
