@@ -29,8 +29,8 @@ from stages.graph import RUNS_DIR
 
 REFERENCE = Path("tests/regression/reference.json")
 PADS = Path("tests/regression/pads.mcap")
-PADS_A_SCENE = 8
-EXIT_DIFFERENT = 1
+PADS_A_SCENE = 8  # from the worst label to the best, in a small file
+EXIT_DIFFERENT = 1  # what Make takes for a failure
 
 
 def main(

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from pipeline.errors import PictureError
 from pipeline.geometry.transforms import invert, transform_points
-from pipeline.world.cameras import PinholeCamera
+from pipeline.world.cameras import PinholeCamera, project_local
 
 SPLAT_PX_A_POINT = 1.3  # pixels a point of a cloud at the mean distance should cover
 LARGEST_PX = 1024  # no depth camera has more pixels a side
@@ -138,21 +138,21 @@ def frame_of_cloud(
     slope = ahead[:, :2] / ahead[:, 2:]
     lower, upper = np.percentile(slope, [0.5, 99.5], axis=0)
     inside = ((slope >= lower) & (slope <= upper)).all(axis=1)
-    ahead, slope = ahead[inside], slope[inside]
+    ahead = ahead[inside]
     span = np.maximum(upper - lower, 1e-6)
     # As many pixels as points, so that a surface has no holes and no pixel stands for many.
     focal_px = float(np.sqrt(len(ahead) / SPLAT_PX_A_POINT / (span[0] * span[1])))
     focal_px = min(focal_px, LARGEST_PX / float(span.max()))
     width, height = (max(16, int(np.ceil(focal_px * extent))) for extent in span)
-    pixel = np.floor((slope - lower) * focal_px).astype(np.int64)
+    intrinsics = np.array(
+        [[focal_px, 0, -lower[0] * focal_px], [0, focal_px, -lower[1] * focal_px], [0, 0, 1.0]]
+    )
+    pixel = np.floor(project_local(intrinsics, ahead)).astype(np.int64)
     column = np.clip(pixel[:, 0], 0, width - 1)
     row = np.clip(pixel[:, 1], 0, height - 1)
     depth_m = np.full((height, width), np.inf)
     np.minimum.at(depth_m, (row, column), ahead[:, 2])
     depth_m[~np.isfinite(depth_m)] = 0.0
-    intrinsics = np.array(
-        [[focal_px, 0, -lower[0] * focal_px], [0, focal_px, -lower[1] * focal_px], [0, 0, 1.0]]
-    )
     pose = np.eye(4) if world_from_camera is None else world_from_camera
     camera = PinholeCamera(name, width, height, intrinsics, pose, "ideal", 0.0, np.inf)
     return Frame(

@@ -20,8 +20,8 @@ from pipeline.control.clearance import free_of_collision
 from pipeline.control.cloud import Cloud, DepthPicture, merged_cloud
 from pipeline.control.ranking import Ranking
 from pipeline.errors import PictureError
-from pipeline.geometry.transforms import frame_from_z, invert, transform_points
-from pipeline.world.cameras import points_of_depth
+from pipeline.geometry.transforms import frame_from_z, invert
+from pipeline.world.cameras import in_picture, points_of_depth, project
 
 EVERY_PX = 2  # every second pixel a side is enough to find planes
 WORLD_UP = np.array([0.0, 0.0, 1.0])  # of a world whose z is up
@@ -285,13 +285,10 @@ def pixels_of(
     -------
     Column and row of each, shape (k, 2), and whether it is seen, shape (k,).
     """
-    local = transform_points(invert(frame.camera.world_from_camera), points_m)
-    k = frame.camera.intrinsics
-    depth = np.where(local[:, 2] > 0, local[:, 2], np.inf)
-    pixel = np.floor(local[:, :2] / depth[:, None] * k[[0, 1], [0, 1]] + k[:2, 2]).astype(np.int64)
-    ahead = local[:, 2] > 0
-    size = np.array([frame.camera.width_px, frame.camera.height_px])
-    return pixel, ahead & ((pixel >= 0) & (pixel < size)).all(axis=1) if within else ahead
+    pixels, depth_m = project(frame.camera, points_m)
+    ahead = depth_m > 0
+    seen = in_picture(frame.camera, pixels) if within else ahead
+    return np.floor(np.where(ahead[:, None], pixels, -1.0)).astype(np.int64), seen
 
 
 def approach_of(world_from_contact: Float[np.ndarray, "k 4 4"]) -> Float[np.ndarray, "k 3"]:

@@ -8,11 +8,10 @@ a place was looked at, and noise is averaged.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from jaxtyping import Bool, Float, Integer
 
-from pipeline.world.cameras import PinholeCamera
+from pipeline.world.cameras import PinholeCamera, points_of_depth
 
 _CUBES_A_SIDE = 1 << 20  # cubes are numbered within ± 1.5 km
 
@@ -78,35 +77,6 @@ def merged_cloud(pictures: Sequence[DepthPicture], voxel_m: float, above_table_m
 
 
 def _measured(picture: DepthPicture, lowest_m: float) -> Cloud:
-    camera = picture.camera
-    depth = np.ascontiguousarray(picture.depth_m, dtype=np.float64)
-    points = _points(depth, camera.intrinsics, camera.world_from_camera, lowest_m)
-    return Cloud(points, np.broadcast_to(camera.world_from_camera[:3, 3], points.shape))
-
-
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
-def _points(
-    depth: Float[np.ndarray, "h w"],
-    k: Float[np.ndarray, "3 3"],
-    pose: Float[np.ndarray, "4 4"],
-    lowest_m: float,
-) -> Float[np.ndarray, "n 3"]:
-    """Measured points in WCS that lie higher than ``lowest_m``."""
-    found = np.empty((depth.size, 3))
-    count = 0
-    for row in range(depth.shape[0]):
-        y = (row + 0.5 - k[1, 2]) / k[1, 1]
-        for column in range(depth.shape[1]):
-            z = depth[row, column]
-            if not (z > 0.0 and z < np.inf):
-                continue
-            x = (column + 0.5 - k[0, 2]) / k[0, 0]
-            height = z * (pose[2, 0] * x + pose[2, 1] * y + pose[2, 2]) + pose[2, 3]
-            if height > lowest_m:
-                for axis in range(2):
-                    found[count, axis] = (
-                        z * (pose[axis, 0] * x + pose[axis, 1] * y + pose[axis, 2]) + pose[axis, 3]
-                    )
-                found[count, 2] = height
-                count += 1
-    return found[:count]
+    points, _, _ = points_of_depth(picture.depth_m, picture.camera, every=1, above_m=lowest_m)
+    eye = picture.camera.world_from_camera[:3, 3]
+    return Cloud(points, np.broadcast_to(eye, points.shape))

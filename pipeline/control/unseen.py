@@ -15,8 +15,7 @@ from jaxtyping import Bool, Float, Integer
 
 from pipeline.config.policy import UnseenConfig
 from pipeline.control.cloud import DepthPicture
-from pipeline.geometry.transforms import invert, transform_points
-from pipeline.world.cameras import pixel_rays, points_of_depth
+from pipeline.world.cameras import in_picture, pixel_rays, points_of_depth, project
 
 TABLE = 0  # instance of the table and of nothing
 
@@ -99,14 +98,10 @@ def _within(
     picture: DepthPicture, mask: Bool[np.ndarray, "h w"], places_m: Float[np.ndarray, "n 3"]
 ) -> Bool[np.ndarray, " n"]:
     """Whether a picture shows each place within the outline, or does not show it at all."""
-    k = picture.camera.intrinsics
-    x, y, z = transform_points(invert(picture.camera.world_from_camera), places_m).T
-    column = np.floor(k[0, 0] * x / z + k[0, 2]).astype(np.int64)
-    row = np.floor(k[1, 1] * y / z + k[1, 2]).astype(np.int64)
-    height, width = mask.shape
-    shown = (z > 0) & (row >= 0) & (row < height) & (column >= 0) & (column < width)
+    pixels, z = project(picture.camera, places_m)
+    shown = in_picture(picture.camera, pixels)
+    column, row = np.floor(pixels[shown]).astype(np.int64).T
     inside = ~shown
-    row, column = row[shown], column[shown]
     depth = picture.depth_m[row, column]
     hidden = (_instances(picture)[row, column] != TABLE) & (depth > 0) & (depth < z[shown])
     inside[shown] = mask[row, column] | hidden

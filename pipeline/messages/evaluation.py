@@ -6,6 +6,7 @@ from pipeline.artifacts.tensors import to_tensor
 from pipeline.control.cloud import DepthPicture
 from pipeline.control.decision import Cause
 from pipeline.simulation.picking import Made
+from pipeline.world.cameras import thinned
 from schemas.softgrip.v1 import evaluation_pb2
 
 PICTURE_EVERY = 4  # pixels a side: a film needs to show what was seen, not to measure it
@@ -57,11 +58,10 @@ def attempt_message(
 def picture_message(picture: DepthPicture) -> evaluation_pb2.DepthPicture:
     """A thinned depth image."""
     depth = np.nan_to_num(picture.depth_m[::PICTURE_EVERY, ::PICTURE_EVERY])
-    intrinsics = picture.camera.intrinsics.copy()
-    intrinsics[:2] /= PICTURE_EVERY
+    camera = thinned(picture.camera, PICTURE_EVERY)
     return evaluation_pb2.DepthPicture(
-        camera=picture.camera.name,
+        camera=camera.name,
         depth_mm=to_tensor(np.round(np.clip(1e3 * depth, 0, 65_535)).astype(np.uint16)),
-        intrinsics=to_tensor(intrinsics),
-        world_from_camera=to_tensor(picture.camera.world_from_camera),
+        intrinsics=to_tensor(camera.intrinsics),
+        world_from_camera=to_tensor(camera.world_from_camera),
     )

@@ -12,7 +12,7 @@ from jaxtyping import Float, Integer
 
 from pipeline.geometry.transforms import invert, transform_points
 from pipeline.sensing.depth_noise import disturb
-from pipeline.world.cameras import PinholeCamera
+from pipeline.world.cameras import PinholeCamera, picture_rays, project_local
 from pipeline.world.raycasting import Surfaces
 from pipeline.world.view import CameraView, normal_map
 
@@ -47,7 +47,7 @@ def window_around(
     x, y, z = transform_points(invert(camera.world_from_camera), point_m)
     near = max(z - radius_m, 1e-3)
     half = radius_m * k[0, 0] / near
-    u, v = k[0, 0] * x / max(z, 1e-3) + k[0, 2], k[1, 1] * y / max(z, 1e-3) + k[1, 2]
+    u, v = project_local(k, np.array([x, y, max(z, 1e-3)])).tolist()
     left, right = _span(u, half, camera.width_px)
     top, bottom = _span(v, half, camera.height_px)
     intrinsics = k.copy()
@@ -64,7 +64,7 @@ def _span(middle: float, half: float, size: int) -> tuple[int, int]:
 def _exact(camera: PinholeCamera, scene: Surfaces) -> CameraView:
     pose = camera.world_from_camera
     shape = (camera.height_px, camera.width_px)
-    directions = _rays(*shape, camera.intrinsics, pose)
+    directions = picture_rays(camera)
     hits = scene.cast(np.broadcast_to(pose[:3, 3], directions.shape), directions)
     depth, normals = _seen(directions, hits.distance_m, scene.normals_at(hits), pose)
     return CameraView(
@@ -74,24 +74,6 @@ def _exact(camera: PinholeCamera, scene: Surfaces) -> CameraView:
         segmentation=np.maximum(hits.body, 0).reshape(shape).astype(np.uint16),
         normals=normal_map(normals.reshape(*shape, 3)),
     )
-
-
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
-def _rays(
-    height: int, width: int, k: Float[np.ndarray, "3 3"], pose: Float[np.ndarray, "4 4"]
-) -> Float[np.ndarray, "n 3"]:
-    """Unit ray through each pixel's centre in WCS, row by row: `cameras.pixel_rays`, compiled."""
-    rays = np.empty((height * width, 3))
-    for row in range(height):
-        y = (row + 0.5 - k[1, 2]) / k[1, 1]
-        for column in range(width):
-            x = (column + 0.5 - k[0, 2]) / k[0, 0]
-            length = np.sqrt(x * x + y * y + 1.0)
-            for axis in range(3):
-                rays[row * width + column, axis] = (
-                    pose[axis, 0] * x + pose[axis, 1] * y + pose[axis, 2]
-                ) / length
-    return rays
 
 
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]

@@ -17,6 +17,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from pipeline.config.cameras import DepthSensor
+from pipeline.world.cameras import pixel_slopes
 from pipeline.world.view import CameraView
 
 
@@ -76,9 +77,7 @@ def cosine_of_incidence(view: CameraView) -> Float[np.ndarray, "h w"]:
 
     The normal is that of the first surface, transparent or not: there the light bends.
     """
-    k = view.camera.intrinsics
-    x = (np.arange(view.camera.width_px) + 0.5 - k[0, 2]) / k[0, 0]
-    y = (np.arange(view.camera.height_px) + 0.5 - k[1, 2]) / k[1, 1]
+    x, y = pixel_slopes(view.camera.intrinsics, view.depth_m.shape)
     return np.asarray(_cosines(view.normals, x, y))
 
 

@@ -10,15 +10,16 @@ Points more than ``grid_depth_m`` below the contact are left out: the pad cannot
 (H = 30 mm). Upwards the grid is as high as the way on which the label looks for obstacles.
 """
 
+import itertools
 from collections.abc import Sequence
 
 import numba
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from pipeline.config.grasps import SensingConfig
 from pipeline.geometry.transforms import invert
-from pipeline.world.cameras import PinholeCamera
+from pipeline.world.cameras import PinholeCamera, pixel_slopes, project_local
 
 
 def sub_clouds(
@@ -41,14 +42,17 @@ def merged_sub_clouds(
     """The same from the points of several depth images together (Supplement VI)."""
     count, cells = len(world_from_contact), config.grid_cells
     box = (config.grid_side_m / 2, config.grid_depth_m, config.grid_height_m)
-    seen_by = [
-        (
-            np.ascontiguousarray(depth_m, dtype=np.float64),
-            camera.intrinsics,
-            np.ascontiguousarray(invert(camera.world_from_camera) @ world_from_contact),
+    seen_by = []
+    for depth_m, camera in pictures:
+        pose = np.ascontiguousarray(invert(camera.world_from_camera) @ world_from_contact)
+        seen_by.append(
+            (
+                np.ascontiguousarray(depth_m, dtype=np.float64),
+                *pixel_slopes(camera.intrinsics, depth_m.shape),
+                pose,
+                _windows(depth_m.shape, camera.intrinsics, pose, box),
+            )
         )
-        for depth_m, camera in pictures
-    ]
     tops = np.full((count, cells, cells), -np.inf)
     sums = np.zeros((count, cells, cells, 4))
     for adding in (False, True):
@@ -63,8 +67,10 @@ def merged_sub_clouds(
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]
 def _gather(
     depth: Float[np.ndarray, "h w"],
-    k: Float[np.ndarray, "3 3"],
+    x: Float[np.ndarray, " w"],
+    y: Float[np.ndarray, " h"],
     camera_from_contact: Float[np.ndarray, "b 4 4"],
+    windows: Int[np.ndarray, "b 4"],
     box: tuple[float, float, float],
     layer: float,
     adding: bool,
@@ -78,14 +84,14 @@ def _gather(
     cells = tops.shape[1]
     for b in range(len(camera_from_contact)):
         pose = camera_from_contact[b]
-        left, right, top, bottom = _window(depth.shape, k, pose, box)
-        across, origin = _axes(k, pose)
+        left, right, top, bottom = windows[b]
+        origin = _origin(pose)
         for row in range(top, bottom + 1):
-            down = _of_row(row, k, pose)
+            down = _of_row(y[row], pose)
             for column in range(left, right + 1):
                 z = depth[row, column]
                 if z > 0.0:
-                    point = _placed(z, column, across, down, origin)
+                    point = _placed(z, x[column], pose, down, origin)
                     i, j = _cell(point, box, cells)
                     if i < 0:
                         continue
@@ -97,44 +103,37 @@ def _gather(
                         sums[b, i, j, 3] += 1.0
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
-def _window(
+def _windows(
     shape: tuple[int, int],
-    k: Float[np.ndarray, "3 3"],
-    pose: Float[np.ndarray, "4 4"],
+    intrinsics: Float[np.ndarray, "3 3"],
+    camera_from_contact: Float[np.ndarray, "b 4 4"],
     box: tuple[float, float, float],
-) -> tuple[int, int, int, int]:
-    """First and last column, first and last row that the box's eight corners project between."""
+) -> Int[np.ndarray, "b 4"]:
+    """First and last column, first and last row that each box's eight corners project between."""
     half, depth, height = box
-    left, right, top, bottom = shape[1], -1, shape[0], -1
-    for corner in range(8):
-        px = half if corner & 1 else -half
-        py = half if corner & 2 else -half
-        pz = height if corner & 4 else -depth
-        x = pose[0, 0] * px + pose[0, 1] * py + pose[0, 2] * pz + pose[0, 3]
-        y = pose[1, 0] * px + pose[1, 1] * py + pose[1, 2] * pz + pose[1, 3]
-        z = pose[2, 0] * px + pose[2, 1] * py + pose[2, 2] * pz + pose[2, 3]
-        if z <= 0.0:  # behind the camera: anywhere in the picture
-            return 0, shape[1] - 1, 0, shape[0] - 1
-        column = int(np.floor(k[0, 0] * x / z + k[0, 2]))
-        row = int(np.floor(k[1, 1] * y / z + k[1, 2]))
-        left, right = min(left, column), max(right, column)
-        top, bottom = min(top, row), max(bottom, row)
-    return max(left, 0), min(right, shape[1] - 1), max(top, 0), min(bottom, shape[0] - 1)
+    corners = np.array(list(itertools.product((-half, half), (-half, half), (-depth, height))))
+    pixels = project_local(
+        intrinsics,
+        corners @ camera_from_contact[:, :3, :3].transpose(0, 2, 1)
+        + camera_from_contact[:, None, :3, 3],
+    )
+    first, last = np.floor(pixels.min(axis=1)), np.floor(pixels.max(axis=1))
+    behind = np.isnan(first)  # a corner behind the camera: anywhere in the picture
+    size = np.array([shape[1], shape[0]])
+    first = np.where(behind, 0.0, np.clip(first, 0, size))
+    last = np.where(behind, size - 1.0, np.clip(last, -1, size - 1))
+    return np.stack([first[:, 0], last[:, 0], first[:, 1], last[:, 1]], axis=1).astype(np.int64)
 
 
-# A pixel's point in CCS is z (u, v, 1), with u of its column and v of its row. In the contact's
-# axes, R^T (z (u, v, 1) - t), only the term in u changes along a row.
+# A pixel's point in CCS is z (u, v, 1), with u the slope of its column and v of its row. In the
+# contact's axes, R^T (z (u, v, 1) - t), only the term in u changes along a row.
 
 
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]
-def _axes(
-    k: Float[np.ndarray, "3 3"], pose: Float[np.ndarray, "4 4"]
-) -> tuple[tuple[float, float, float, float, float], tuple[float, float, float]]:
-    """R^T along u for a column, with the columns' scale; and R^T t."""
-    across = (pose[0, 0], pose[0, 1], pose[0, 2], 1.0 / k[0, 0], k[0, 2] - 0.5)
+def _origin(pose: Float[np.ndarray, "4 4"]) -> tuple[float, float, float]:
+    """R^T t."""
     x, y, z = pose[0, 3], pose[1, 3], pose[2, 3]
-    return across, (
+    return (
         pose[0, 0] * x + pose[1, 0] * y + pose[2, 0] * z,
         pose[0, 1] * x + pose[1, 1] * y + pose[2, 1] * z,
         pose[0, 2] * x + pose[1, 2] * y + pose[2, 2] * z,
@@ -142,11 +141,8 @@ def _axes(
 
 
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]
-def _of_row(
-    row: int, k: Float[np.ndarray, "3 3"], pose: Float[np.ndarray, "4 4"]
-) -> tuple[float, float, float]:
+def _of_row(v: float, pose: Float[np.ndarray, "4 4"]) -> tuple[float, float, float]:
     """R^T (0, v, 1) of a row."""
-    v = (row + 0.5 - k[1, 2]) / k[1, 1]
     return (
         pose[1, 0] * v + pose[2, 0],
         pose[1, 1] * v + pose[2, 1],
@@ -157,17 +153,16 @@ def _of_row(
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]
 def _placed(
     z: float,
-    column: int,
-    across: tuple[float, float, float, float, float],
+    u: float,
+    pose: Float[np.ndarray, "4 4"],
     down: tuple[float, float, float],
     origin: tuple[float, float, float],
 ) -> tuple[float, float, float]:
     """A pixel's point from the contact, in the contact's axes."""
-    u = (column - across[4]) * across[3]
     return (
-        z * (across[0] * u + down[0]) - origin[0],
-        z * (across[1] * u + down[1]) - origin[1],
-        z * (across[2] * u + down[2]) - origin[2],
+        z * (pose[0, 0] * u + down[0]) - origin[0],
+        z * (pose[0, 1] * u + down[1]) - origin[1],
+        z * (pose[0, 2] * u + down[2]) - origin[2],
     )
 
 
