@@ -35,7 +35,7 @@ class Candidates:
         return len(self.roughness_m)
 
     def take(self, chosen: Bool[np.ndarray, " k"] | Int[np.ndarray, " j"]) -> "Candidates":
-        """Some of them."""
+        """The candidates at the given indices, or where a mask is true."""
         return Candidates(self.world_from_contact[chosen], self.roughness_m[chosen])
 
 
@@ -45,7 +45,25 @@ _NONE = Candidates(np.empty((0, 4, 4)), np.empty(0))  # no candidate at all
 def sample_candidates(
     cloud: Cloud, count: int, radius_m: float, tilt_max_rad: float, rng: np.random.Generator
 ) -> Candidates:
-    """u contacts at random on the cloud; fewer where surfaces are too steep or too small."""
+    """Draw contacts at random from the cloud and give each its frame.
+
+    Parameters
+    ----------
+    cloud
+        Measured points in WCS.
+    count
+        Contacts to draw, with repetition; u of Supplement VI.
+    radius_m
+        Radius of the neighbourhood whose mean normal is the approach axis [m].
+    tilt_max_rad
+        Largest angle between that normal and the vertical [rad]; steeper contacts are left out.
+    rng
+        Generator of the draw.
+
+    Returns
+    -------
+    At most ``count`` candidates: those too steep or with too few points around are left out.
+    """
     if len(cloud) == 0:
         return _NONE
     at = rng.integers(len(cloud), size=count)
@@ -61,7 +79,30 @@ def sample_near(
     tilt_max_rad: float,
     rng: np.random.Generator,
 ) -> Candidates:
-    """The contact itself, first, and others at random near it, for corrections on the way down."""
+    """Draw contacts at random near a given one, for corrections during the approach.
+
+    Parameters
+    ----------
+    cloud
+        Measured points in WCS.
+    contact_m
+        The contact aimed at, in WCS [m], shape (3,).
+    within_m
+        Radius around ``contact_m`` from which contacts are drawn [m].
+    count
+        Contacts to draw, the measured point nearest to ``contact_m`` included.
+    radius_m
+        Radius of the neighbourhood whose mean normal is the approach axis [m].
+    tilt_max_rad
+        Largest angle between that normal and the vertical [rad]; steeper contacts are left out.
+    rng
+        Generator of the draw.
+
+    Returns
+    -------
+    At most ``count`` candidates; the nearest measured point comes first unless it is left out. None
+    where no point lies within the radius.
+    """
     near = np.flatnonzero(np.linalg.norm(cloud.points_m - contact_m, axis=1) <= within_m)
     if len(near) == 0:
         return _NONE
@@ -77,10 +118,29 @@ def candidates_at(
     radius_m: float,
     tilt_max_rad: float,
 ) -> Candidates:
-    """Frames at the contacts whose mean normal is not too far off the vertical.
+    """Compute the frame and roughness of each contact, and leave out steep ones.
 
-    The contact is moved along its normal onto the plane through the points within ``radius_m``:
-    their mean is nearer to the surface than one noisy point.
+    A contact is moved along its normal onto the plane through the points around it: their mean is
+    nearer to the surface than one noisy point.
+
+    Parameters
+    ----------
+    cloud
+        Measured points in WCS.
+    contacts_m
+        Points of the surface in WCS [m], shape (k, 3).
+    eyes_m
+        Position of the camera that measured each contact, in WCS [m], shape (k, 3); normals point
+        towards it.
+    radius_m
+        Radius of the neighbourhood that the plane is fitted to [m].
+    tilt_max_rad
+        Largest angle between normal and vertical [rad].
+
+    Returns
+    -------
+    Candidates in the order of the contacts, without those that are too steep or have too few points
+    around them.
     """
     count, mean, scatter = _neighbourhoods(cloud.points_m, contacts_m, radius_m)
     enough = count >= _FEWEST_POINTS

@@ -1,4 +1,4 @@
-"""Poses whose rigid parts would run into what was measured."""
+"""Which gripper poses would make its rigid stem collide with measured points."""
 
 import numba
 import numpy as np
@@ -12,9 +12,22 @@ def free_of_collision(
     points_m: Float[np.ndarray, "n 3"],
     hand: HandConfig,
 ) -> Bool[np.ndarray, " k"]:
-    """Whether the stem, at the contact and all the way down to it, meets no measured point.
+    """Whether the stem meets no measured point, at the contact and on the way down to it.
 
-    The stem goes down along its own axis, so what it sweeps is its own cylinder, made longer.
+    The stem moves along its own axis, so the volume it sweeps is a longer cylinder.
+
+    Parameters
+    ----------
+    world_from_gripper
+        Poses of the gripper at its contact, shape (k, 4, 4).
+    points_m
+        Measured points in WCS [m], shape (n, 3).
+    hand
+        The stem's radius, where it begins above the pad, and the margin kept from points.
+
+    Returns
+    -------
+    True for each pose that is free, shape (k,).
     """
     return np.asarray(
         _free(

@@ -36,7 +36,15 @@ class DepthPicture:
 
 @dataclass(frozen=True, eq=False)
 class Cloud:
-    """Points of the objects in WCS. eye_m : (n, 3) where the camera stood that saw each."""
+    """Measured points of the objects.
+
+    Attributes
+    ----------
+    points_m
+        Points in WCS [m], shape (n, 3).
+    eye_m
+        Position in WCS of the camera that measured each point [m], shape (n, 3).
+    """
 
     points_m: Float[np.ndarray, "n 3"]
     eye_m: Float[np.ndarray, "n 3"]
@@ -45,21 +53,25 @@ class Cloud:
         return len(self.points_m)
 
     def take(self, chosen: Bool[np.ndarray, " n"] | Integer[np.ndarray, " k"]) -> "Cloud":
-        """Some of the points."""
+        """The points at the given indices, or where a mask is true."""
         return Cloud(self.points_m[chosen], self.eye_m[chosen])
 
 
 def merged_cloud(pictures: Sequence[DepthPicture], voxel_m: float, above_table_m: float) -> Cloud:
-    """The objects' points of all pictures, one a cube; without the table's.
+    """Merge the objects' points of several pictures into one cloud, one point a cube of the world.
 
     Parameters
     ----------
     pictures
         Depth images of one scene.
     voxel_m
-        Side of a cube of the world whose points become their mean [m].
+        Side of a cube whose points become their mean [m].
     above_table_m
-        Points lower than this over z = 0 may be the table and are left out [m].
+        Points lower than this over z = 0 may belong to the table and are left out [m].
+
+    Returns
+    -------
+    The means, each with the camera position of the first point in its cube.
     """
     parts = [_measured(picture, above_table_m) for picture in pictures]
     points = np.concatenate([part.points_m for part in parts])

@@ -1,4 +1,4 @@
-"""The local phase's one step: look at the aim again, and move it where that promises more."""
+"""One step of the local phase: compare the aim with contacts near it and take the best."""
 
 import numpy as np
 from jaxtyping import Float
@@ -18,10 +18,29 @@ def corrected(
     normal_radius_m: float,
     rng: np.random.Generator,
 ) -> tuple[Float[np.ndarray, "4 4"], float] | None:
-    """The pose to aim at now and its q-hat; None where the picture shows nothing to go by.
+    """Choose the pose to aim at after a new picture of the wrist's camera.
 
-    The aim itself, as it is seen now, is the first candidate: another must promise more by
-    ``correction_gain``, so that noise does not move the gripper to and fro.
+    The measured point nearest to the aim is the first candidate. Another one is taken only where
+    its quality is higher by ``correction_gain``, so that noise alone does not move the gripper.
+
+    Parameters
+    ----------
+    picture
+        Depth image of the surroundings of the aim.
+    aim
+        world_from_contact aimed at so far, shape (4, 4).
+    ranking
+        Gives the quality of each candidate.
+    config
+        Bounds of the correction, and the rigid parts of the gripper.
+    normal_radius_m
+        Radius over which a contact's normal is measured [m].
+    rng
+        Generator of the candidates.
+
+    Returns
+    -------
+    world_from_contact, shape (4, 4), and its q-hat; None where no candidate is left.
     """
     policy = config.policy
     cloud = merged_cloud([picture], policy.correction_voxel_m, policy.above_table_m)

@@ -1,4 +1,4 @@
-"""What an attempt is told, and what it reports: strategy, cause of its end, decisions taken."""
+"""What an attempt is given (its strategy) and what it reports: its decisions and its end."""
 
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -12,7 +12,7 @@ from pipeline.control.ranking import Ranking
 
 
 class Cause(StrEnum):
-    """Why an attempt ended; LIFTED is the good one."""
+    """Why an attempt ended; LIFTED is success."""
 
     LIFTED = "lifted"
     CAMERA_STOPPED = "camera stopped"
@@ -33,13 +33,17 @@ class Strategy:
 
     Attributes
     ----------
+    name
+        The policy's name in the configuration.
+    ranking
+        Gives the quality of each candidate.
     several_views
-        Whether the wrist looks before the choice.
+        Whether the wrist's camera takes pictures before the choice.
     corrects
-        Whether it looks again on the way down.
+        Whether it takes pictures during the approach and the aim is corrected by them.
     feels
-        Whether the wrench is heeded: what the first tug shows not to hold is grasped elsewhere,
-        nearer to the load's centre where one is felt, and the lift is trimmed.
+        Whether the measured wrench is used: after a tug that does not hold, the object is grasped
+        elsewhere, nearer to the load's centre where one was measured, and the lift is trimmed.
     """
 
     name: PolicyName
@@ -51,12 +55,28 @@ class Strategy:
 
 @dataclass(eq=False)
 class Decision:
-    """How an attempt went, as far as the policy knows; filled in as it goes.
+    """What the policy decided in one attempt; the attempt fills it in as it goes.
 
     Attributes
     ----------
+    cause
+        Why the attempt ended.
+    candidates
+        world_from_contact of the last global phase's candidates, shape (k, 4, 4).
+    quality
+        Their q-hat, shape (k,).
+    predicted_quality
+        q-hat of the contact aimed at last.
+    world_from_contact
+        The contact aimed at last, shape (4, 4).
+    corrections
+        How often the aim was corrected by a picture.
+    regrasps
+        How often the object was grasped again after a tug that did not hold.
     spoilt_m
-        Contacts that did not hold in the first tug.
+        Contacts in WCS that did not hold in the first tug [m], each of shape (3,).
+    pictures
+        Depth images that the last choice was made from.
     """
 
     cause: Cause = Cause.EMPTY_CLOUD

@@ -1,6 +1,7 @@
-"""The global phase: look from several viewpoints, sample contacts, rank them, take the best.
+"""The global phase: take pictures, sample contacts, rank them, choose the best that can be reached.
 
-What colour shows and depth does not is ranked below all that was measured: it can only be felt for.
+Objects that only the colour pictures show, such as transparent ones, rank below all measured
+contacts: the gripper has to go down on them until it touches.
 """
 
 from collections.abc import Callable, Sequence
@@ -31,7 +32,17 @@ Travel = Callable[[Pose], Cause | None]
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """A contact that may be aimed at, its q-hat, and whether it must be felt for, unmeasured."""
+    """A contact to aim at.
+
+    Attributes
+    ----------
+    world_from_contact
+        Its frame, shape (4, 4).
+    quality
+        Its q-hat; 0 where it was not measured.
+    felt_for
+        Whether its height is not measured, so that the pad goes down until it touches.
+    """
 
     world_from_contact: Pose
     quality: float
@@ -39,7 +50,7 @@ class Choice:
 
 
 class GlobalPhase:
-    """What there is to aim at, the best first, as it was last seen."""
+    """The contacts to aim at in one attempt, ranked from the latest pictures."""
 
     def __init__(
         self,
@@ -51,10 +62,25 @@ class GlobalPhase:
         rng: np.random.Generator,
         avoid_m: Sequence[Float[np.ndarray, " 3"]],
     ) -> None:
-        """Parameters
+        """Store what the phase works with; nothing is looked at yet.
+
+        Parameters
         ----------
+        eyes
+            The cameras.
+        robot
+            Tells its pose and which poses it can reach.
+        strategy
+            Gives the ranking.
+        config
+            Settings of the policy and the rigid parts of the gripper.
+        normal_radius_m
+            Radius over which a contact's normal is measured [m].
+        rng
+            Generator of the candidates.
         avoid_m
-            Contacts that failed before, tried again only where nothing else is left.
+            Contacts in WCS that failed in earlier attempts [m], each of shape (3,); places near
+            them are tried only where nothing else is left.
         """
         self._eyes = eyes
         self._robot = robot
@@ -68,13 +94,19 @@ class GlobalPhase:
         self._ranked: list[Choice] = []
 
     def look(self, decision: Decision, travel: Travel | None) -> Cause | None:
-        """Rank all that is seen; what is seen and ranked is noted in the decision.
+        """Take pictures and rank the contacts in them.
 
         Parameters
         ----------
+        decision
+            Receives the pictures, the candidates and their quality.
         travel
-            Brings the wrist's camera above what is promising; None: only what stands beside the
-            table looks.
+            Moves the gripper so that the wrist's camera is above promising places; None: only the
+            cameras beside the table are used.
+
+        Returns
+        -------
+        None where there is a contact to aim at, otherwise why there is none.
         """
         pictures = self._eyes.static()
         if pictures is None:
@@ -98,11 +130,14 @@ class GlobalPhase:
         return None if self._ranked else Cause.NO_CANDIDATE
 
     def best(self, least: float) -> Choice | None:
-        """The best of what is left that promises at least so much and can be reached."""
+        """The best reachable contact of at least this quality that was not rejected, or None."""
         return self._first_of(self._ranked, least)
 
     def better_than(self, aim: Pose, quality: float) -> Choice | None:
-        """A place elsewhere that promises at least so much; the aim is then rejected."""
+        """The best contact of at least this quality away from ``aim``; None where there is none.
+
+        Where one is returned, the surroundings of ``aim`` are rejected for the rest of the attempt.
+        """
         self._rejected_m.append(aim[:3, 3])
         choice = self.best(quality)
         if choice is None:
@@ -110,7 +145,7 @@ class GlobalPhase:
         return choice
 
     def reject(self, places_m: Sequence[Float[np.ndarray, " 3"]]) -> None:
-        """Nothing near to these contacts is to be aimed at again."""
+        """Exclude the surroundings of these contacts, in WCS [m], for the rest of the attempt."""
         self._rejected_m += places_m
 
     def nearer_to(
@@ -119,12 +154,20 @@ class GlobalPhase:
         lever_m: float,
         pictures: Sequence[DepthPicture],
     ) -> Choice | None:
-        """A contact nearer to the line on which a load hangs.
+        """The best contact that is nearer to the vertical line through a load's centre.
 
         Parameters
         ----------
+        place_m
+            Where the load hangs, horizontally in WCS [m], shape (2,).
         lever_m
-            Horizontal lever of the contact that did not hold.
+            Horizontal lever of the contact that did not hold [m].
+        pictures
+            Depth images to sample contacts from.
+
+        Returns
+        -------
+        The contact; None where none is nearer, free of collision and reachable.
         """
         cloud = self._cloud(pictures)
         top = top_of_column_m(cloud, place_m, self._policy.regrasp_column_m)

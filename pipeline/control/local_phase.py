@@ -1,7 +1,7 @@
-"""The local phase: what the wrist's camera sees on the way down corrects the aim.
+"""The local phase: pictures of the wrist's camera during the approach correct the aim.
 
-The velocity of what passes by carries the aim along, and leads it where the camera is too near to
-see it any more.
+The measured velocity of a moving object moves the aim along with it, also when the camera is too
+near to see the object any more.
 """
 
 import numpy as np
@@ -33,7 +33,7 @@ class LocalPhase:
         self.start_over()
 
     def start_over(self) -> None:
-        """Another place is aimed at: how the last one moved says nothing of it."""
+        """Forget the motion measured so far, because another place is aimed at."""
         policy = self._config.policy
         self._motion = Motion(
             1.0 / policy.rate_hz, policy.shown_share * policy.look_m, policy.motion
@@ -41,11 +41,11 @@ class LocalPhase:
 
     @property
     def moves(self) -> bool:
-        """Whether what is aimed at passes by."""
+        """Whether the object aimed at was measured to move."""
         return bool(self._motion.velocity_m_s.any())
 
     def look(self, picture: DepthPicture, aim: Pose) -> tuple[Pose, float] | None:
-        """The pose to aim at now and its q-hat; None where there is nothing to go by."""
+        """The pose to aim at after a new picture, and its q-hat; None without any candidate."""
         policy = self._config.policy
         cloud = merged_cloud([picture], policy.voxel_m, policy.above_table_m)
         self._motion.see(cloud.points_m, aim[:3, 3])
@@ -59,11 +59,11 @@ class LocalPhase:
         )
 
     def met(self, aim: Pose, here: Pose) -> Pose:
-        """Where the aim will be when the pad, now here, gets there."""
+        """Where the aim will be when the pad, now at ``here``, reaches it."""
         return self._after(way_left_m(aim, here) / self._config.policy.speed_m_s, aim)
 
     def passed_on(self, aim: Pose) -> Pose:
-        """The aim one control period later."""
+        """Count one control period and return where the aim is after it."""
         self._motion.passed()
         return self._after(1.0 / self._config.policy.rate_hz, aim)
 
@@ -74,5 +74,5 @@ class LocalPhase:
 
 
 def way_left_m(aim: Pose, here: Pose) -> float:
-    """How far the pad, now here, still is from the aim, along its approach."""
+    """Distance from the pad at ``here`` to the aim along the approach axis [m], at least 0."""
     return max(float((here[:3, 3] - aim[:3, 3]) @ aim[:3, 2]), 0.0)

@@ -1,8 +1,8 @@
-"""How fast what is aimed at passes by: where its heights have gone since it was first seen.
+"""Velocity of the object aimed at, from the shift of its heights between pictures.
 
 Heights above the table, on a grid of the world, are compared with those of an earlier picture
-where both were looked at: the shift with the least mean squared difference, over the time between
-the two, is the velocity. Objects move on the table, so the shift is level.
+where both pictures show the place. The shift with the least mean squared difference, divided by
+the time between the two, is the velocity. Objects move on the table, so the shift is horizontal.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from pipeline.config.policy import MotionConfig
 
 
 class Motion:
-    """Velocity of what lies around the aim, picture by picture, one control period apart."""
+    """Velocity of what lies around the aim; pictures are one or more control periods apart."""
 
     def __init__(self, period_s: float, seen_m: float, config: MotionConfig) -> None:
         """Nothing has been seen yet.
@@ -40,11 +40,11 @@ class Motion:
         self.velocity_m_s = np.zeros(3)
 
     def passed(self) -> None:
-        """One control period has gone by."""
+        """Count one control period."""
         self._periods += 1
 
     def see(self, points_m: Float[np.ndarray, "n 3"], aim_m: Float[np.ndarray, " 3"]) -> None:
-        """The points that a picture taken now measured around the aim, in WCS."""
+        """Update the velocity from the points, in WCS [m], of a picture taken around the aim."""
         if len(points_m) == 0:
             return
         if self._before is None or self._periods == 0:
@@ -76,7 +76,15 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class HeightMap:
-    """Cells of a square. height_m : 0 where nothing stands. seen : 1 where it was looked at."""
+    """Heights on the cells of a square.
+
+    Attributes
+    ----------
+    height_m
+        Greatest height in each cell [m], shape (n, n); 0 where nothing stands.
+    seen
+        1 in cells that a picture covers, else 0, shape (n, n).
+    """
 
     height_m: Float[np.ndarray, "n n"]
     seen: Float[np.ndarray, "n n"]
@@ -88,14 +96,22 @@ def height_map(
     radius_cells: int,
     half_cells: int,
 ) -> HeightMap:
-    """Greatest height about each cell, as far as was looked.
+    """Greatest height in each cell and its neighbours, within the disc that the picture covers.
 
     Parameters
     ----------
     points
-        x, y in cells from the middle of the square; z [m].
-    looked_at, radius_cells
-        The disc that was looked at, in cells.
+        x, y in cells from the middle of the square, z in metres, shape (n, 3).
+    looked_at
+        Centre of the disc in cells from the middle of the square, shape (2,).
+    radius_cells
+        Radius of the disc in cells.
+    half_cells
+        Cells on each side of the middle one.
+
+    Returns
+    -------
+    The map, of 2 ``half_cells`` + 1 cells a side.
     """
     heights = np.zeros((2 * half_cells + 1,) * 2)
     cell = np.round(points[:, :2]).astype(np.int64) + half_cells
@@ -111,12 +127,20 @@ def height_map(
 def shift_between(
     before: HeightMap, after: HeightMap, config: MotionConfig
 ) -> Float[np.ndarray, " 2"]:
-    """By how many cells the heights have moved, to a fraction of one; 0 where none fits better.
+    """Shift of the heights from one map to the next, in cells.
 
     Parameters
     ----------
+    before
+        The earlier map.
     after
-        The same place in a larger square; what it is larger by bounds the shift.
+        The same place in a larger square; half the difference in size bounds the shift.
+    config
+        Least overlap of the two maps, and how much a shift must explain.
+
+    Returns
+    -------
+    Shift along x and y in cells, with fraction, shape (2,); 0 where no shift fits clearly better.
     """
 
     def correlated(a: Float[np.ndarray, "m m"], b: Float[np.ndarray, "n n"]) -> np.ndarray:

@@ -1,13 +1,14 @@
-"""One attempt, from the first look to the lifted object or the cause why not.
+"""One attempt, from the first picture to the lifted object or the cause of the failure.
 
 Global phase: clouds of several viewpoints are merged, u candidates sampled and ranked in one
 batch; those the robot cannot reach or that would collide are left out. Local phase: the wrist's
-camera looks again at every control step, and the contact is corrected, until the camera is too
-near; then straight on until contact. After that the wrench leads (Supplement VI): what the first
-tug shows not to hold is grasped once more, nearer to its centre where it hung askew and broke away,
-else at the next best place. What colour shows and depth does not is felt for, straight down, where
-nothing better is left. What is needed of the world is in `pipeline.control.robot`; each way to end
-is in `pipeline.control.decision`.
+camera takes a picture at every control step, and the contact is corrected, until the camera is
+too near; then the gripper goes straight on until contact. After that the wrench decides
+(Supplement VI): an object that the first tug does not hold is grasped once more, nearer to its
+centre of mass where the wrench showed where that is, otherwise at the next best place. An object
+that colour shows and depth does not is approached straight down until contact, where no measured
+contact is left. `pipeline.control.robot` defines what the policy needs of the world,
+`pipeline.control.decision` the ways to end.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,7 +29,7 @@ Phase = tuple[State, Callable[[], Cause | None]]
 
 
 class Attempt:
-    """One try: `run` goes through the phases, each of which ends well (None) or with a cause."""
+    """One attempt: `run` goes through the phases; each returns None or the cause of failure."""
 
     def __init__(
         self,
@@ -40,10 +41,25 @@ class Attempt:
         rng: np.random.Generator,
         avoid_m: Sequence[Float[np.ndarray, " 3"]] = (),
     ) -> None:
-        """Parameters
+        """Prepare an attempt; nothing moves yet.
+
+        Parameters
         ----------
+        eyes
+            The cameras.
+        robot
+            Moves the gripper and switches the vacuum.
+        strategy
+            Ranking, and which of pictures and wrench are used.
+        config
+            Settings of policy, lift and gripper.
+        normal_radius_m
+            Radius over which a contact's normal is measured [m].
+        rng
+            Generator of the candidates.
         avoid_m
-            Contacts that failed before, tried again only where nothing else is left.
+            Contacts in WCS that failed in earlier attempts [m], each of shape (3,); places near
+            them are tried only where nothing else is left.
         """
         self._eyes = eyes
         self._robot = robot
@@ -60,7 +76,7 @@ class Attempt:
         self.decision = Decision()
 
     def run(self) -> Decision:
-        """Try once."""
+        """Make the attempt, and return what was decided and why it ended."""
         cause = self._through(
             (State.OBSERVE, self._choose),
             *self._to_the_seal(),
@@ -111,9 +127,10 @@ class Attempt:
         return self._travel(backed_off(self.decision.world_from_contact, self._policy.standoff_m))
 
     def _approach(self) -> Cause | None:
-        """The local phase: look, correct, step; until the pad touches.
+        """The local phase: take a picture, correct, step; until the pad touches.
 
-        What runs away is not chased for ever: nor past the robot's reach, nor longer than a while.
+        A moving object is followed only within the robot's reach and for at most
+        ``approach_max_s``.
         """
         for _ in range(round(self._policy.approach_max_s * self._policy.rate_hz)):
             aim = self.decision.world_from_contact
@@ -172,7 +189,7 @@ class Attempt:
         return None
 
     def _choose_anew(self) -> Cause | None:
-        """Nothing to grasp is left near the aim: again, in haste, from beside the table alone.
+        """Choose again, from the cameras beside the table alone: nothing is left near the aim.
 
         Where that finds nothing either, the aim stays.
         """
@@ -183,10 +200,10 @@ class Attempt:
         return cause if cause is Cause.CAMERA_STOPPED else None
 
     def _seal(self) -> Cause | None:
-        """Vacuum on, and the first bit of the lift: a held object pulls.
+        """Switch the vacuum on and lift a little: an object that is held pulls on the gripper.
 
-        What pulled and broke away was held too far from its centre of mass: nearer, once more.
-        Where nothing pulled, or nothing is nearer: at the next best place, once more.
+        Where it pulled and broke away, it was held too far from its centre of mass: try nearer to
+        that. Where nothing pulled, or nothing is nearer: try the next best place.
         """
         self._robot.vacuum(on=True)
         start = self._robot.pose()

@@ -29,8 +29,8 @@ class Ranking(Protocol):
 class NetworkRanking:
     """q-hat of GA-CNN, all candidates in one batch, on the sub cloud of all pictures.
 
-    Each candidate's value is then averaged with its neighbours': the best of many noisy values
-    is a lucky one, and a pose whose neighbours are as good forgives a millimetre.
+    Each candidate's value is then averaged with its neighbours': the largest of many noisy values
+    is too high by chance, and a pose whose neighbours are as good tolerates a millimetre of error.
     """
 
     def __init__(

@@ -1,8 +1,8 @@
-"""What hung askew and broke away: where it hangs from, felt at the base, and contacts nearer to it.
+"""Where a load hangs that broke away from the pad, and contacts nearer to that place.
 
 Supplement VI: the wrench serves to «minimize the moments on the gripper base during grasping». A
-pad bears far less moment than pull, so what is heavy must be held near its centre of mass, which
-no picture shows; a first tug does.
+pad bears far less moment than pull, so a heavy object must be held near its centre of mass. No
+picture shows it; the wrench during a first tug does.
 """
 
 import numpy as np
@@ -46,7 +46,7 @@ def worth_with_lever(
     lever_m: float,
     config: PolicyConfig,
 ) -> Float[np.ndarray, " k"]:
-    """q-hat, less the farther the contact is from where the load hangs; 0 where that gains little.
+    """q-hat, reduced with the distance from where the load hangs; 0 where it is hardly nearer.
 
     Parameters
     ----------
@@ -55,12 +55,16 @@ def worth_with_lever(
     candidates
         Contacts to choose among.
     place_m
-        Where the load hangs, horizontally in WCS [m].
+        Where the load hangs, horizontally in WCS [m], shape (2,).
     lever_m
         Horizontal lever of the contact that did not hold [m].
     config
-        How much nearer a new contact must be, and the radius over which worth falls: the moment
+        How much nearer a new contact must be, and the radius over which the value falls: the moment
         that a pad bears grows with its radius.
+
+    Returns
+    -------
+    Value of each candidate in [0, 1], shape (k,).
     """
     aside = np.linalg.norm(candidates.world_from_contact[:, :2, 3] - place_m, axis=1)
     fall = np.exp(-((aside / config.regrasp_radius_m) ** 2))

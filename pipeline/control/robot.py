@@ -1,4 +1,4 @@
-"""What the policy needs of the world: eyes, and a robot that moves one control step at a time."""
+"""What the policy needs: cameras, and a robot that moves one control step at a time."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -12,7 +12,7 @@ from pipeline.world.cameras import PinholeCamera
 
 
 class State(StrEnum):
-    """Where an attempt is."""
+    """The phase that an attempt is in."""
 
     OBSERVE = "observe"
     PREGRASP = "pregrasp"
@@ -51,7 +51,7 @@ class Reading:
 
 
 class Eyes(Protocol):
-    """The cameras. None is what a camera that has stopped delivers."""
+    """The cameras; a camera that has stopped returns None."""
 
     def static(self) -> list[DepthPicture] | None:
         """One picture of every camera beside the table."""
@@ -70,7 +70,7 @@ class Robot(Protocol):
     """Moves the gripper and switches the vacuum."""
 
     def enter(self, state: State) -> None:
-        """Told what the policy is at, for the record."""
+        """Receive the phase that begins now, for the recording."""
         ...
 
     def pose(self) -> Float[np.ndarray, "4 4"]:
@@ -78,11 +78,11 @@ class Robot(Protocol):
         ...
 
     def reachable(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> bool:
-        """Whether the robot can take the pose, joint limits and all."""
+        """Whether the robot can take the pose within its joint limits."""
         ...
 
     def step(self, world_from_gripper: Float[np.ndarray, "4 4"], speed_m_s: float) -> Reading:
-        """One control period straight towards a pose; it stops where the pad touches."""
+        """Move straight towards a pose for one control period; stop where the pad touches."""
         ...
 
     def vacuum(self, on: bool) -> None:
@@ -90,5 +90,5 @@ class Robot(Protocol):
         ...
 
     def shake(self) -> Reading:
-        """Side to side, then still, as `LiftConfig` says; the mean wrench while still."""
+        """Move side to side, then stop, as `LiftConfig` says; return the mean wrench at rest."""
         ...

@@ -20,7 +20,7 @@ def success_rate(lifted: int, attempts: int) -> tuple[float, float, float]:
 
 @dataclass(frozen=True)
 class Outcome:
-    """One clutter as one policy left it."""
+    """Attempts of one policy at one clutter."""
 
     lifted: int
     attempts: int

@@ -1,10 +1,10 @@
-"""What colour shows and depth does not: transparent objects, felt for where their outlines meet.
+"""Contacts on objects that colour pictures show and depth images do not, such as transparent ones.
 
 A depth camera measures what lies behind a transparent object (Supplement VIII, first failure). With
 a segmentation of the colour pictures, an instance whose pixels were measured no higher than the
 table is such an object. Its outlines from several viewpoints bound it: the visual hull (Laurentini,
-1994), all places that every picture shows within the outline. Where it is, the hull tells well; how
-high, only at most: the pad goes down until it touches.
+1994), all places that every picture shows within the outline. The hull gives the object's
+horizontal place well, and its height only as an upper bound: the pad goes down until it touches.
 """
 
 from collections import Counter

@@ -1,4 +1,4 @@
-"""Poses of the gripper: where the wrist looks from, how it turns, where an approach begins."""
+"""Poses of the gripper for pictures of the wrist's camera, and where an approach begins."""
 
 import numpy as np
 from jaxtyping import Float
@@ -38,9 +38,9 @@ def turned_about(world_from_gripper: Float[np.ndarray, "4 4"]) -> Float[np.ndarr
 def facing(
     world_from_contact: Float[np.ndarray, "4 4"], before: Float[np.ndarray, "4 4"]
 ) -> Float[np.ndarray, "4 4"]:
-    """The pose turned about its approach so that the wrist turns as little as can be.
+    """The pose turned about its approach axis so that the wrist turns as little as possible.
 
-    The pad is round: its spin is free, and the camera and the arm are glad of the shortest way.
+    The pad is round, so the angle about the axis is free; this choice makes the arm's way shortest.
     """
     z = world_from_contact[:3, 2]
     x = before[:3, 0] - (before[:3, 0] @ z) * z
@@ -56,7 +56,7 @@ def facing(
 def backed_off(
     world_from_contact: Float[np.ndarray, "4 4"], distance_m: float
 ) -> Float[np.ndarray, "4 4"]:
-    """The pose out along its approach."""
+    """The pose moved by a distance [m] against its approach direction; negative: ahead."""
     pose = world_from_contact.copy()
     pose[:3, 3] += distance_m * pose[:3, 2]
     return pose

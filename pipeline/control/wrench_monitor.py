@@ -1,4 +1,4 @@
-"""What the wrench at the gripper's base tells: contact, collision, seal, slip, loss.
+"""Events told from the wrench at the gripper's base: contact, collision, seal, slip, loss.
 
 Supplement VI: the force-torque wrench is «mainly utilized to monitor the grasp status, like
 collision and grasp success, optimize the robotic motion, and minimize the moments on the gripper
@@ -16,7 +16,7 @@ from pipeline.control.robot import Reading
 
 
 class Event(StrEnum):
-    """What was felt."""
+    """What a reading shows."""
 
     NOTHING = "nothing"
     CONTACT = "contact"
@@ -34,7 +34,7 @@ class WrenchMonitor:
         self._line: Float[np.ndarray, " 3"] | None = None
 
     def moving(self, reading: Reading) -> Event:
-        """In free space and on the way down: a push on the pad, or more than may be."""
+        """The event of a reading in free space or during the approach."""
         if reading.peak_n > self._config.force_limit_n:
             return Event.COLLISION
         if not reading.followed:
@@ -44,11 +44,11 @@ class WrenchMonitor:
         return Event.NOTHING
 
     def holds(self, reading: Reading) -> bool:
-        """Whether something hangs on the gripper: its pull shows the seal (grasp success)."""
+        """Whether an object hangs on the gripper: its pull shows the seal (grasp success)."""
         return hanging_n(reading) >= self._config.tension_min_n
 
     def carrying(self, reading: Reading) -> Event:
-        """While something is held: gone, or shifted under the pad."""
+        """The event of a reading while an object is held: lost, or slipped under the pad."""
         if not self.holds(reading):
             return Event.LOSS
         before, self._line = self._line, line_of_load(reading.wrench)
@@ -74,11 +74,26 @@ def trimmed(
     left_rad: float,
     config: PolicyConfig,
 ) -> tuple[Float[np.ndarray, "4 4"], float]:
-    """The pose turned about the pad towards less moment at the base, and the angle turned.
+    """Turn the pose about the pad so that the moment at the base falls.
 
-    A load F at r from the base has the moment M = r x F. A turn by a small angle about M moves
-    the load's line nearer to the base, by the angle times the load's depth below it. Torsion
-    about the gripper's axis is left alone: no tilt mends it. left_rad : most it may turn.
+    A load F at r from the base has the moment M = r x F. A turn by a small angle about M moves the
+    load's line nearer to the base, by the angle times the load's depth below it. Torsion about the
+    gripper's axis is not corrected, as no tilt reduces it.
+
+    Parameters
+    ----------
+    world_from_gripper
+        The pose now, shape (4, 4).
+    wrench
+        Force [N] and moment [N m] at the base in GCS, shape (6,).
+    left_rad
+        Largest angle that it may turn by [rad].
+    config
+        Moment below which nothing is done, lever, and largest step.
+
+    Returns
+    -------
+    The new pose, shape (4, 4), and the angle turned [rad].
     """
     force = wrench[:3]
     moment = wrench[3:] * [1.0, 1.0, 0.0]

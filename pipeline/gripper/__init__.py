@@ -1,7 +1,7 @@
 """The soft vacuum gripper: pad, draping, pressure, wrench, limits, quality.
 
-Pure functions of arrays: what the scene looks like under the pad comes in as a height a
-vertex, along z of GCS and from any origin, with a mask of what lies on the target.
+Pure functions of arrays. The scene under the pad is given as one height for each vertex, along z
+of GCS and from any origin, with a mask of the vertices below which the target lies.
 """
 
 from pipeline.gripper.batch import LabelBatch, label, label_batch

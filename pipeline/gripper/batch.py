@@ -53,7 +53,7 @@ class LabelBatch:
         return len(self.q)
 
     def take(self, chosen: Int[np.ndarray, " k"]) -> "LabelBatch":
-        """Those at the given indices."""
+        """The grasps at the given indices."""
         return LabelBatch(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
     @staticmethod
@@ -87,7 +87,7 @@ def label(
     heights_m: Float[np.ndarray, " vertices"],
     on_target: Bool[np.ndarray, " vertices"],
 ) -> GraspQuality:
-    """One grasp of `label_batch`."""
+    """Label one grasp; see `label_batch`."""
     return label_batch(pad, config, heights_m[None], on_target[None])[0]
 
 
@@ -101,11 +101,19 @@ def label_batch(
 
     Parameters
     ----------
+    pad
+        The pad in GCS.
+    config
+        Physics and solver.
     heights_m
         z_s, height of the scene under each vertex along z of each grasp's own GCS, from any
-        origin [m]; NaN or -inf where nothing is below.
+        origin [m], shape (batch, vertices); NaN or -inf where nothing is below.
     on_target
-        Whether what lies under a vertex is the object to be grasped.
+        Whether the object to be grasped lies under a vertex, shape (batch, vertices).
+
+    Returns
+    -------
+    The labels, one row a grasp.
 
     Notes
     -----
@@ -189,6 +197,7 @@ def label_batch(
 
 
 def empty_batch(rows: int, vertices: int) -> LabelBatch:
+    """A batch of zeros for kernels to write into."""
     return LabelBatch(
         q=np.zeros(rows),
         pressure=np.zeros(rows),
@@ -304,7 +313,7 @@ def _conclude_into(
     slacks: Float[np.ndarray, "batch 8"],
     summary: Float[np.ndarray, "batch 3"],
 ) -> None:
-    """S-1.12: GW, its slacks, what W looks like, and q."""
+    """S-1.12: GW, its slacks, the summary of W, and q."""
     for row in range(counts.size):
         n = counts[row]
         if n == 0:

@@ -31,16 +31,19 @@ def edge_hops(pad: Pad) -> Int[np.ndarray, "vertices vertices"]:
 def drape_reference(
     pad: Pad, heights_m: Float[np.ndarray, " vertices"]
 ) -> Float[np.ndarray, " vertices"]:
-    """`drape` as its definition reads, from all pairs of vertices: the oracle.
+    """`drape` computed as its definition reads, from all pairs of vertices; tests compare with it.
 
     Parameters
     ----------
+    pad
+        The pad in GCS.
     heights_m
-        z_s, height of the scene under each vertex [m]; NaN or -inf where nothing is below.
+        z_s, height of the scene under each vertex [m], shape (vertices,); NaN or -inf where nothing
+        is below.
 
     Returns
     -------
-    z(v) in the same frame [m]; -inf everywhere if the pad is over nothing at all.
+    z(v) in the same frame [m], shape (vertices,); -inf everywhere if nothing is below the pad.
     """
     surface = np.where(np.isfinite(heights_m), heights_m, -np.inf)
     if not np.isfinite(surface).any():

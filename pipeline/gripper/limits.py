@@ -36,6 +36,10 @@ def wrench_limits(
         F_v of Eq. (7), in units of G.
     friction
         Mu [1].
+
+    Returns
+    -------
+    Lower and upper bounds of F_x, F_y, F_z and T_z, each of shape (4,).
     """
     lower, upper = wrench_limit_ratios(friction)
     return vacuum_force * lower, vacuum_force * upper

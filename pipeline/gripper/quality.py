@@ -101,15 +101,22 @@ def triangle_pressure(
 ) -> Float[np.ndarray, " triangles"]:
     """Pull on each triangle of a draped pad per area, over that of a full seal: p w_j [1].
 
-    p is Eq. (2)'s, w_j the optimum's of Eq. (14); 0 where a triangle is not in contact. Where no
-    W keeps the limits, w_j is 1.
+    p is that of Eq. (2), w_j the optimum of Eq. (14). Where no W keeps the limits, w_j is 1.
 
     Parameters
     ----------
+    pad
+        The pad in GCS.
+    config
+        Physics and solver.
     draped_m
-        z(v) of S-1.07, from any origin [m].
+        z(v) of S-1.07, from any origin [m], shape (vertices,).
     vertex_contact
-        Which vertices are in contact with the target.
+        Which vertices are in contact with the target, shape (vertices,).
+
+    Returns
+    -------
+    p w_j of each triangle, shape (triangles,); 0 where a triangle is not in contact.
     """
     pressure = np.zeros(len(pad.triangles))
     contact = contact_of(pad, draped_m, vertex_contact)
@@ -129,11 +136,19 @@ def label_reference(
 
     Parameters
     ----------
+    pad
+        The pad in GCS.
+    config
+        Physics and solver.
     heights_m
-        z_s, height of the scene under each vertex along z of GCS, from any origin [m]; NaN or
-        -inf where nothing is below.
+        z_s, height of the scene under each vertex along z of GCS, from any origin [m], shape
+        (vertices,); NaN or -inf where nothing is below.
     on_target
-        Whether what lies under the vertex is the object to be grasped.
+        Whether the object to be grasped lies under a vertex, shape (vertices,).
+
+    Returns
+    -------
+    The label.
     """
     draped = drape_reference(pad, heights_m)
     vertex_contact = contact_vertices(pad, draped, heights_m, on_target)

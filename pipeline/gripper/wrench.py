@@ -21,8 +21,16 @@ def wrench_matrix(pad: Pad, contact: Contact, friction: float) -> Float[np.ndarr
 
     Parameters
     ----------
+    pad
+        The pad in GCS.
+    contact
+        Its n contact triangles and the pressure p.
     friction
         Mu of Eq. (3) and (4) [1].
+
+    Returns
+    -------
+    G, shape (4, n).
     """
     pull = contact.pressure * contact.areas_m2 / pad.area_m2
     n_x, n_y, n_z = contact.normals.T
