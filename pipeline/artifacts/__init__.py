@@ -1,4 +1,4 @@
-"""MCAP in and out: versions, provenance, atomic publishing."""
+"""MCAP files: reading and writing, versions, provenance, publishing a file whole or not at all."""
 
 from pipeline.artifacts.provenance import Input, Provenance, package_version
 from pipeline.artifacts.publishing import file_sha256, publish_bytes, published

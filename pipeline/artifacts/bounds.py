@@ -1,8 +1,8 @@
-"""What an MCAP declares of its own sizes and checksums, held against the file before it is trusted.
+"""Checks of the sizes and checksums that an MCAP file declares, before they are trusted.
 
-The library's reader allocates what a record declares, and of all checksums it looks at those of
-chunks alone. Here a declared size is refused before it is allocated, and the index section, an
-attachment and the data section as a whole are held against their checksums.
+The library's reader allocates what a record declares, and it checks the checksums of chunks alone.
+Here a declared size is refused before it is allocated, and the index section, an attachment and the
+data section as a whole are compared with their checksums.
 """
 
 import io
@@ -33,7 +33,7 @@ REMEDY = "Delete it and run the same command again"
 
 
 class BoundedFile(io.BufferedReader):
-    """A file that refuses a read beyond its end instead of allocating for it."""
+    """A file that refuses a read beyond its end instead of allocating memory for it."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(io.FileIO(path))
@@ -41,24 +41,44 @@ class BoundedFile(io.BufferedReader):
         self.size = path.stat().st_size
 
     def read(self, size: int | None = -1, /) -> bytes:
-        """As of any file.
+        """Read bytes from the current position.
+
+        Parameters
+        ----------
+        size
+            Bytes to read; None or -1: all that are left.
+
+        Returns
+        -------
+        The bytes; fewer than ``size`` at the end of the file.
 
         Raises
         ------
         ArtifactError
-            More than a small piece is asked for and the file does not hold it.
+            More than ``SMALL_READ_BYTES`` are asked for and the file does not hold them.
         """
         if size is not None and size > SMALL_READ_BYTES and size > self.size - self.tell():
             raise self.damaged(f"it declares {size} bytes where {self.size - self.tell()} are left")
         return super().read(size)
 
     def seek(self, target: int, whence: int = io.SEEK_SET, /) -> int:
-        """As of any file.
+        """Move the position.
+
+        Parameters
+        ----------
+        target
+            Offset in bytes.
+        whence
+            What the offset counts from, as for any file.
+
+        Returns
+        -------
+        The new position, in bytes from the start.
 
         Raises
         ------
         ArtifactError
-            a place outside the file is asked for.
+            The place, counted from the start, lies outside the file.
         """
         if whence == io.SEEK_SET and not 0 <= target <= self.size:
             raise self.damaged(f"it points to byte {target} of {self.size}")
@@ -77,7 +97,16 @@ class BoundedFile(io.BufferedReader):
 
 
 def check_index(file: BoundedFile) -> int:
-    """Where the index (summary) section starts.
+    """Compare the index (summary) section with its checksum.
+
+    Parameters
+    ----------
+    file
+        The file; its position is at the start afterwards.
+
+    Returns
+    -------
+    Where the section starts, in bytes from the start of the file.
 
     Raises
     ------
@@ -93,7 +122,12 @@ def check_index(file: BoundedFile) -> int:
 
 
 def check_data(file: BoundedFile) -> None:
-    """Hold every byte of the data section against its checksum; reads the whole file.
+    """Compare the data section with its checksum; reads the whole file.
+
+    Parameters
+    ----------
+    file
+        The file.
 
     Raises
     ------
@@ -114,7 +148,14 @@ def check_data(file: BoundedFile) -> None:
 
 
 def check_chunk(file: BoundedFile, index: ChunkIndex) -> None:
-    """Hold what a chunk declares against the file and the largest chunk there may be.
+    """Compare what a chunk declares with the file and with the largest chunk allowed.
+
+    Parameters
+    ----------
+    file
+        The file.
+    index
+        The chunk's entry in the file's index.
 
     Raises
     ------
@@ -139,7 +180,18 @@ def check_chunk(file: BoundedFile, index: ChunkIndex) -> None:
 
 
 def checked_attachment(file: BoundedFile, index: AttachmentIndex) -> bytes:
-    """The record of an attachment, without its head.
+    """Read the record of an attachment and compare it with its checksum.
+
+    Parameters
+    ----------
+    file
+        The file.
+    index
+        The attachment's entry in the file's index.
+
+    Returns
+    -------
+    The record without its opcode and length.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What an artifact says of itself, and whether what it was made from is still what is there."""
+"""Contents of an artifact, and whether the files it was made from are unchanged."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -18,14 +18,22 @@ INDEX_NAME = ShardIndex.DESCRIPTOR.full_name
 
 @dataclass(frozen=True)
 class Contents:
-    """What an artifact says of itself.
+    """What an artifact records of itself.
 
     Attributes
     ----------
+    path
+        The file.
+    size_bytes
+        Its size [bytes].
+    provenance
+        What made it.
     counts
         Topic → (schema, messages).
+    attachments
+        Name → size [bytes].
     shards
-        File → samples, of a sharded artifact's index.
+        File → samples, of a sharded artifact's index; empty for others.
     """
 
     path: Path
@@ -38,14 +46,31 @@ class Contents:
 
 @dataclass(frozen=True)
 class Finding:
-    """One file held against what is recorded of it; ``problem`` is empty where it agrees."""
+    """One file compared with what is recorded of it.
+
+    Attributes
+    ----------
+    path
+        The file.
+    problem
+        What differs, in words; empty where nothing does.
+    """
 
     path: Path
     problem: str = ""
 
 
 def contents_of(path: Path) -> Contents:
-    """Provenance, schemas, counts, attachments and shards.
+    """Read provenance, schemas, counts, attachments and shards of an artifact.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    What it records of itself.
 
     Raises
     ------
@@ -66,9 +91,21 @@ def contents_of(path: Path) -> Contents:
 
 
 def verified(path: Path, mesh_dir: Path | None) -> Iterator[Finding]:
-    """Hold a file and, up the chain to the meshes, everything it was made from against its digest.
+    """Compare a file, and everything it was made from up to the meshes, with the recorded digests.
 
-    Every byte of every artifact is read. A file is looked at once, however many name it.
+    Every byte of every artifact is read, each file once, however many others name it.
+
+    Parameters
+    ----------
+    path
+        The artifact to begin with.
+    mesh_dir
+        Folder of the meshes; None: meshes are reported as not compared.
+
+    Yields
+    ------
+    Finding
+        One for each file.
     """
     run = run_folder(path)
     digest = cache(file_sha256)

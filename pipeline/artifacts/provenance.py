@@ -27,10 +27,25 @@ class Provenance:
 
     Attributes
     ----------
+    stage
+        Name of the stage.
     key
-        Digest over configuration, code, machine and inputs; the freshness criterion.
+        Digest over configuration, code, machine and inputs; a file is fresh while this is
+        unchanged.
+    config_digest
+        SHA-256 over the configuration that the stage reads.
+    code_digest
+        SHA-256 over the code that the stage runs.
+    seed
+        The run's seed.
+    inputs
+        Files that the stage read, with their digests.
+    package_version
+        Version of softgrip.
+    schema_version
+        Major version of the message schemas.
     key_parts
-        What that digest is over, as JSON; empty in files that do not tell it.
+        What ``key`` is computed over, as JSON; empty in files that do not record it.
     """
 
     stage: str
@@ -58,6 +73,15 @@ class Provenance:
     @classmethod
     def from_metadata(cls, metadata: dict[str, str]) -> Self:
         """Read the record back.
+
+        Parameters
+        ----------
+        metadata
+            The record as MCAP metadata, as `to_metadata` gives it.
+
+        Returns
+        -------
+        The record.
 
         Raises
         ------

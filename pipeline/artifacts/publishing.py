@@ -1,7 +1,8 @@
-"""Files appear whole or not at all: written beside their place, flushed, renamed.
+"""Publishing files whole or not at all: written beside their place, flushed, renamed.
 
-What is being written lies in a scratch file whose name tells who writes it, so that two
-writers of one file share none and what a killed writer left can be told from what is alive.
+A file is first written to a scratch file whose name holds its writer's machine and process. Two
+writers of one file therefore use different scratch files, and a scratch file of a process that was
+killed can be told from one that is still being written.
 """
 
 import errno
@@ -33,9 +34,19 @@ _WRITER = re.compile(r"\.([0-9a-f]{8})-(\d+)-(\d+)-[0-9a-f]{8}\.part$")
 
 @contextmanager
 def published(path: Path) -> Iterator[Path]:
-    """Yield a scratch path beside ``path``; on success it becomes ``path``.
+    """Write a file through a scratch file beside it, which replaces it when the block succeeds.
 
-    On any failure the scratch file goes and what stood at ``path`` stays.
+    On any failure the scratch file is removed and a former file at ``path`` stays.
+
+    Parameters
+    ----------
+    path
+        The file to write; missing folders are made.
+
+    Yields
+    ------
+    Path
+        The scratch file to write to.
 
     Raises
     ------
@@ -57,7 +68,7 @@ def published(path: Path) -> Iterator[Path]:
 
 
 def scratch_beside(path: Path) -> Path:
-    """A new name beside ``path`` for what will become it; it tells this process and is hidden."""
+    """A new hidden name beside ``path`` for a scratch file; it holds this machine and process."""
     writer = f"{_machine()}-{os.getpid()}-{_start_of(os.getpid())}-{secrets.token_hex(4)}"
     ending = f".{writer}{SCRATCH_SUFFIX}"
     room = LONGEST_NAME_BYTES - len(ending) - 1
@@ -65,7 +76,12 @@ def scratch_beside(path: Path) -> Path:
 
 
 def remove_abandoned_scratch(folder: Path) -> list[Path]:
-    """Remove what killed writers left anywhere below ``folder``; what is being written stays.
+    """Remove scratch files of killed writers; what a running process writes stays.
+
+    Parameters
+    ----------
+    folder
+        Searched with all folders below it.
 
     Returns
     -------
@@ -99,7 +115,7 @@ def file_sha256(path: Path) -> str:
 
 
 def write_error(path: Path, error: OSError) -> ArtifactError:
-    """What the system says of a file that could not be written, with what to do about it."""
+    """The error for a file that could not be written: the system's reason, and the remedy."""
     if error.errno in FULL:
         return ArtifactError(
             f"{path} could not be written: the disk is full",
@@ -116,7 +132,7 @@ def write_error(path: Path, error: OSError) -> ArtifactError:
 
 
 def _is_abandoned(scratch: Path) -> bool:
-    """Whether the writer named in a scratch file's name has ended, as far as can be told here."""
+    """Whether the writer named in a scratch file's name has ended, as far as can be told."""
     writer = _WRITER.search(scratch.name)
     if writer is not None and writer[1] == _machine():
         return _start_of(int(writer[2])) != int(writer[3])

@@ -61,19 +61,26 @@ class Artifact:
     def messages(
         self, kind: type[M], topic: str | None = None, at_ns: int | None = None
     ) -> Iterator[tuple[int, M]]:
-        """(log_time_ns, message) of every message of a type, in log-time order.
+        """Read every message of a type, in log-time order.
 
         Parameters
         ----------
+        kind
+            Class of the messages.
         topic
-            That topic alone.
+            Read this topic alone; None: all topics that carry the type.
         at_ns
-            That log time alone.
+            Read messages of this log time alone [ns]; None: all.
+
+        Yields
+        ------
+        tuple[int, M]
+            Log time [ns] and message.
 
         Raises
         ------
         ArtifactError
-            a topic carries another version of the type, or bytes are damaged.
+            A topic carries another version of the type, or bytes are damaged.
         """
         wanted = kind.DESCRIPTOR.full_name
         topics = self._topics_of(wanted) if topic is None else [topic]
@@ -176,13 +183,23 @@ class Artifact:
 
 @contextmanager
 def open_artifact(path: Path) -> Iterator[Artifact]:
-    """Open an artifact for reading, every checksum on.
+    """Open an artifact for reading; every checksum is compared.
+
+    Parameters
+    ----------
+    path
+        The file.
+
+    Yields
+    ------
+    Artifact
+        The open artifact.
 
     Raises
     ------
     ArtifactError
-        Missing, not an MCAP, damaged, or of another version; also where what the caller makes
-        of its messages shows that they cannot be used.
+        Missing, not an MCAP, damaged, or of another version; also where the caller finds that its
+        messages cannot be used (`ContentError`).
     """
     try:
         file = BoundedFile(path)

@@ -1,4 +1,4 @@
-"""Artifacts in many files: shard names, what of them is already there, and their index."""
+"""Artifacts of many files: names of shards, which of them are current, and their index."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -22,7 +22,7 @@ def shard_path(folder: Path, index: int, count: int) -> Path:
 
 
 def is_current(path: Path, key: str) -> bool:
-    """Whether a shard is there, whole, and made from what is there now."""
+    """Whether a shard exists, can be read, and carries this key."""
     if not path.is_file():
         return False
     try:
@@ -32,7 +32,7 @@ def is_current(path: Path, key: str) -> bool:
 
 
 def shard_entry(path: Path, relative_to: Path, samples: int, split: str) -> ShardEntry:
-    """What the index says of one shard."""
+    """The index entry of one shard: path below ``relative_to``, digest, samples and split."""
     name = path.relative_to(relative_to).as_posix()
     return ShardEntry(path=name, sha256=file_sha256(path), samples=samples, split=split)
 
@@ -62,12 +62,23 @@ def read_index(path: Path) -> ShardIndex:
 
 
 def listed_shards(path: Path, splits: Iterable[str] = ("train", "val", "test")) -> list[Path]:
-    """The shards of some splits, in order.
+    """The shards of some splits, in the index's order.
+
+    Parameters
+    ----------
+    path
+        The index.
+    splits
+        Names of the splits wanted.
+
+    Returns
+    -------
+    Paths of the shards.
 
     Raises
     ------
     ArtifactError
-        One that the index names is missing, or a name leads out of the folder.
+        A wanted shard is missing, or a name in the index leads out of the folder.
     """
     wanted = set(splits)
     shards = []

@@ -1,4 +1,4 @@
-"""NumPy arrays in and out of softgrip.v1.Tensor."""
+"""NumPy arrays to softgrip.v1.Tensor and back."""
 
 import math
 from collections.abc import Mapping
@@ -18,6 +18,15 @@ LONGEST_SIDE = 2**40  # even of an empty array
 def to_tensor(array: np.ndarray) -> Tensor:
     """Pack an array as little-endian bytes in C order.
 
+    Parameters
+    ----------
+    array
+        Any shape.
+
+    Returns
+    -------
+    The message.
+
     Raises
     ------
     ArtifactError
@@ -33,7 +42,16 @@ def to_tensor(array: np.ndarray) -> Tensor:
 
 
 def from_tensor(tensor: Tensor) -> np.ndarray:
-    """A read-only view of the tensor's bytes; no copy, no loop.
+    """View a tensor's bytes as an array, without a copy.
+
+    Parameters
+    ----------
+    tensor
+        The message.
+
+    Returns
+    -------
+    A read-only array of the declared shape and dtype.
 
     Raises
     ------
@@ -62,8 +80,12 @@ def set_tensors(
 
     Parameters
     ----------
+    message
+        The message to fill.
     arrays
-        Those that ``stored_as`` names, and any others.
+        Field → array, for all fields of ``stored_as``; others are ignored.
+    stored_as
+        Field → dtype, such as ``f4``.
     """
     for name, dtype in stored_as.items():
         getattr(message, name).CopyFrom(to_tensor(arrays[name].astype(dtype)))
@@ -75,14 +97,22 @@ def tensors_of(
     shapes: Mapping[str, str],
     unless_there: Mapping[str, float] = MappingProxyType({}),
 ) -> dict[str, np.ndarray]:
-    """Several tensors of a message, each of its dtype and all of shapes that fit together.
+    """Read several tensors of a message and check their dtypes and shapes.
 
     Parameters
     ----------
+    message
+        The message.
+    stored_as
+        Field → dtype, such as ``f4``.
     shapes
         Field → sides such as ``"n g g 3"``; a letter is one length wherever it stands.
     unless_there
-        Fields that files of an older program lack → what they hold instead.
+        Field that files of an older program lack → value that fills the array instead.
+
+    Returns
+    -------
+    Field → read-only array as stored; fields that were filled are writable.
 
     Raises
     ------

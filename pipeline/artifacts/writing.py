@@ -1,4 +1,4 @@
-"""Writing an MCAP artifact: protobuf messages, provenance first, published whole."""
+"""Writing an MCAP artifact of protobuf messages, with provenance first, published as a whole."""
 
 from contextlib import ExitStack
 from pathlib import Path
@@ -55,7 +55,16 @@ class ArtifactWriter:
         return self
 
     def write(self, topic: str, message: Message, log_time_ns: int) -> None:
-        """Append a message; ``log_time_ns`` is simulated time or the sample's index.
+        """Append a message.
+
+        Parameters
+        ----------
+        topic
+            Topic of one message type.
+        message
+            The message.
+        log_time_ns
+            Simulated time [ns], or the sample's index.
 
         Raises
         ------

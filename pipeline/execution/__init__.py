@@ -1,4 +1,4 @@
-"""Work items → results, in order: stages, seeds, progress, freshness, resume."""
+"""Running stages: work items in order, seeds, progress, freshness, resuming."""
 
 from pipeline.execution.commands import run_command
 from pipeline.execution.executors import run_in_order

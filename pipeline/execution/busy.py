@@ -1,4 +1,4 @@
-"""How much of a stage's time went into the one thing that it should wait for."""
+"""Share of a stage's time that went into the work that limits it."""
 
 import time
 from collections.abc import Iterator
@@ -6,9 +6,10 @@ from contextlib import contextmanager
 
 
 class BusyClock:
-    """Time spent in a kind of work, over wall time; counted from the end of the first piece.
+    """Time spent in one kind of work, over wall time; counted from the end of the first piece.
 
-    The first piece pays what is paid once (a renderer compiles its shaders) and is left out.
+    The first piece is left out, because it holds what is done once: a renderer compiles its
+    shaders.
     """
 
     def __init__(self) -> None:
@@ -17,7 +18,7 @@ class BusyClock:
 
     @contextmanager
     def busy(self) -> Iterator[None]:
-        """Around one piece of the work."""
+        """Time the block as one piece of the work."""
         started = time.perf_counter()
         yield
         ended = time.perf_counter()

@@ -1,7 +1,7 @@
-"""What code a stage's result, or its recording, depends on: source files as digests.
+"""Digests of the source files that a stage's result, or its recording, depends on.
 
-A file counts by what Python makes of it: its syntax tree without docstrings and comments. What is
-reached by import counts, also from within functions.
+A file counts by its syntax tree without docstrings and comments. All modules reached by import
+count, imports within functions included.
 """
 
 import ast
@@ -55,7 +55,7 @@ def code_digests(module: str, without: tuple[str, ...] = DRAWING + RUNNING) -> d
 
 
 def foreign_imports(module: str, without: tuple[str, ...] = DRAWING + RUNNING) -> set[str]:
-    """Dotted names of what a module reaches by import that is not ours."""
+    """Dotted names of modules of other projects that a module reaches by import."""
     found = set()
     for name in reached(module, without):
         imports = _parsed(_source_of(name)).imports
@@ -114,10 +114,10 @@ def _is_words(node: ast.stmt) -> bool:
 
 
 def _deciding(module: str) -> list[ast.stmt]:
-    """What of a configuration module decides results beside the values, which digest themselves.
+    """Statements of a configuration module that can change results and do not show in its values.
 
-    Fields, what is derived from them as a property, and validators show in the values of a
-    section (`pipeline.config.section_digest`). Left are constants, functions and methods.
+    Fields, properties derived from them, and validators show in the values of a section, which have
+    their own digest (`pipeline.config.section_digest`). Left are constants, functions and methods.
     """
     found: list[ast.stmt] = []
     for statement in _parsed(_source_of(module)).tree.body:

@@ -1,4 +1,4 @@
-"""Commands beside the stages: words on the screen, and a failure that ends in one sentence."""
+"""Commands that are not stages: where messages go, and failures that end in one sentence."""
 
 import sys
 from collections.abc import Callable
@@ -13,7 +13,7 @@ EXIT_FAILURE = 1  # what shells read as a failure
 
 
 def run_command(command: Callable[..., None] | typer.Typer) -> None:
-    """Run a function, or an app of several, from the command line; its options are typer's."""
+    """Run a function, or a typer app of several, as a command line; exit non-zero on failure."""
     words_to(sys.stderr)
     app = command
     if not isinstance(app, typer.Typer):
@@ -27,6 +27,6 @@ def run_command(command: Callable[..., None] | typer.Typer) -> None:
 
 
 def words_to(sink: TextIO, level: str = "INFO") -> None:
-    """What is told goes to ``sink``, a line each, with neither date nor place in the code."""
+    """Send log messages to ``sink``, one a line, without date or place in the code."""
     logger.remove()
     logger.add(sink, level=level, format="{message}")

@@ -1,4 +1,4 @@
-"""Work items in, results out, in order; whoever computes them.
+"""Work items in, results out, in order, whichever processes compute them.
 
 A work item is a picklable value, a job a module-level function of one item.
 Results arrive in the order of the items, so what is written never depends on
@@ -36,21 +36,34 @@ def run_in_order(
     executor: Executor = "local",
     ahead_per_worker: int = AHEAD_PER_WORKER,
 ) -> Iterator[Result]:
-    """Yield ``job(item)`` for every item, in order, from ``workers`` processes or a Ray cluster.
+    """Compute ``job(item)`` for every item, in worker processes or on a Ray cluster.
 
     One worker runs in this process. Processes are spawned, not forked: drivers
     of graphics and threads of native libraries do not survive a fork.
 
     Parameters
     ----------
+    job
+        A module-level function of one item.
+    items
+        Picklable values.
+    workers
+        Processes to work in.
+    executor
+        Where they run.
     ahead_per_worker
-        Results that may wait for their turn; many where they are small and items take unequal
-        time.
+        Results of each worker that may wait for their turn; many where results are small and items
+        take unequal time.
+
+    Yields
+    ------
+    Result
+        Result of each item, in the order of the items.
 
     Raises
     ------
     SoftgripError
-        a worker process died (killed, or out of memory).
+        A worker process died (killed, or out of memory).
     """
     if executor == "ray":
         from pipeline.execution.ray_executor import run_on_ray  # an optional package
@@ -85,9 +98,10 @@ def run_in_order(
 def _submitted(
     pool: ProcessPoolExecutor, job: Callable[[Item], Result], item: Item
 ) -> Future[Result]:
-    """``pool.submit``, which may have to start a process, and that just as the pool breaks.
+    """Submit an item, and report a pool that breaks meanwhile as `BrokenProcessPool`.
 
-    The pool closes its pipes when a worker dies; starting another then fails on the closed ones.
+    Submitting may start a process. The pool closes its pipes when a worker dies; starting another
+    one then fails on the closed pipes with another error.
     """
     try:
         with _interrupts_put_off():
@@ -98,12 +112,13 @@ def _submitted(
 
 @contextmanager
 def _interrupts_put_off() -> Iterator[None]:
-    """What starts meanwhile never hears SIGINT, not even while its interpreter starts.
+    """Start workers that never receive SIGINT, not even while their interpreter starts.
 
-    A terminal sends it to the whole group; ending the run is the driver's part. The driver hears
-    it, or SIGTERM, once it is out of here: half a started worker would complain of its driver.
-    The mask is what a worker inherits. It does not keep the driver from being interrupted, for a
-    thread of a native library may take the signal, and Python then handles it in this one.
+    A terminal sends SIGINT to the whole process group, and only the driver is to end the run. The
+    driver receives SIGINT or SIGTERM after the block, as a worker whose start is cut short would
+    print errors about its driver. Workers inherit the signal mask. The mask alone does not protect
+    the driver, for a thread of a native library may take the signal, and Python then handles it in
+    the main thread.
     """
     heard: list[int] = []
     handlers: dict[signal.Signals, _Handler] = {}

@@ -1,10 +1,10 @@
-"""Fresh by content, not by date: what a stage's artifact and its recording depend on, as keys.
+"""Keys of what a stage's artifact and its recording depend on, by content and not by date.
 
 A key holds four parts: the digests of the configuration sections the stage reads, of every source
-file its module reaches by import, what the machine brings (Python, the packages that decide, the
-renderer), and the digests of its inputs' content. An artifact is fresh when it carries the key of
-today. A recording has a key of its own, as it is drawn from a finished artifact: what only draws
-changes that key alone.
+file its module reaches by import, of the machine (Python, the packages that change results, the
+renderer), and of its inputs' content. An artifact is fresh when it carries the key of today. A
+recording is drawn from a finished artifact and has a key of its own, so that a change of code that
+only draws changes that key alone.
 """
 
 import hashlib
@@ -26,7 +26,7 @@ PARTS = ("config", "code", "machine", "inputs")
 class Key:
     """What a result depends on, part by part.
 
-    Parameters
+    Attributes
     ----------
     config
         Configuration section → digest of its values.
@@ -79,12 +79,21 @@ class Key:
 
 
 def key_from_json(text: str) -> Key:
-    """Read back ``Key.to_json``.
+    """Read back the text that `Key.to_json` gives.
+
+    Parameters
+    ----------
+    text
+        The key as JSON.
+
+    Returns
+    -------
+    The key.
 
     Raises
     ------
     ValueError
-        It is none, or one of an earlier softgrip, which knew other parts.
+        The text is no key, or the key of an earlier softgrip, which had other parts.
     """
     parts = json.loads(text)
     if not isinstance(parts, dict) or set(parts) != set(PARTS):
@@ -114,11 +123,15 @@ def stage_key(
     inputs
         Name → file; contents are hashed.
     memo
-        File that remembers the hashes of what did not change.
+        File that keeps the hashes of files that did not change.
     renderer
-        What its pictures come from; empty where it renders none.
+        The renderer of its pictures; empty where it renders none.
     without
-        Modules and packages of ours that decide nothing of the artifact.
+        Modules and packages of ours that cannot change the artifact.
+
+    Returns
+    -------
+    The key.
     """
     machine = {"python": platform.python_version(), **package_versions(module, without)}
     return Key(
@@ -141,7 +154,11 @@ def drawing_key(config: RunConfig, shown: tuple[str, ...], module: str, artifact
     module
         The Python module that draws.
     artifact
-        The key of what is drawn.
+        The key of the artifact that is drawn.
+
+    Returns
+    -------
+    The key.
     """
     return Key(
         config={name: section_digest(config, (name,)) for name in shown},

@@ -22,16 +22,28 @@ AHEAD_PER_CPU = 2  # items in flight, so that a slow driver bounds memory
 
 
 def run_on_ray(job: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
-    """Yield ``job(item)`` for every item, in order; one CPU of the cluster each.
+    """Compute ``job(item)`` for every item on a Ray cluster, one CPU each.
 
     The cluster is the one RAY_ADDRESS names, else the one started on this machine.
+
+    Parameters
+    ----------
+    job
+        A module-level function of one item.
+    items
+        Picklable values.
+
+    Yields
+    ------
+    Result
+        Result of each item, in the order of the items.
 
     Raises
     ------
     MachineError
         Ray is not installed, or no cluster answers.
     SoftgripError
-        a job's node died more often than it is tried again.
+        The node of a job died more often than the job is tried again.
     """
     try:
         import ray

@@ -1,7 +1,7 @@
-"""Which renderer a run's pictures come from on this machine, told without rendering one.
+"""Which renderer makes a run's pictures on this machine, found without rendering one.
 
-``auto`` takes SAPIEN where a Vulkan driver can render, and that is tried in a process of its own.
-What the trial found is remembered for as long as drivers, devices and the user's choice stay.
+``auto`` takes SAPIEN where a Vulkan driver can render; that is tried in a process of its own. The
+result is kept in a file and used again until drivers, devices or environment variables change.
 """
 
 import json
@@ -60,7 +60,11 @@ def told_renderer(name: RendererName, memo: Path) -> str:
 
 
 def try_renderer() -> dict[str, Any]:
-    """What `pipeline.physics.render_trial` finds on this machine now.
+    """Run `pipeline.physics.render_trial` in a process of its own.
+
+    Returns
+    -------
+    What it printed: the renderer, and the files whose change makes the result invalid.
 
     Raises
     ------

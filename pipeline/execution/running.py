@@ -1,4 +1,4 @@
-"""Running one stage from the command line: lock, freshness, log, summary, plain failures."""
+"""Running one stage from the command line: lock, freshness, log, summary, readable failures."""
 
 import json
 import os
@@ -135,14 +135,14 @@ def run_stage(
 
 
 def drawn(context: StageContext, draw: Draw, figures: Summary) -> None:
-    """Draw the recording, and note what it was drawn from and by."""
+    """Draw the recording, and record the key that it was drawn with."""
     draw(context, figures)
     note = context.drawing_key.to_json().encode()
     publish_bytes(drawn_note(context.folder, context.name), note)
 
 
 def kept_summary(folder: RunFolder, stage: str) -> Summary:
-    """The summary of a stage that is made; empty where the file is lost."""
+    """Read the summary of a finished stage; empty where the file is missing or damaged."""
     try:
         return dict(json.loads(folder.summary(stage).read_text()))
     except (FileNotFoundError, ValueError):
@@ -160,7 +160,7 @@ def _publish_summary(context: StageContext, record: Summary) -> None:
 
 @contextmanager
 def _exclusive(folder: RunFolder, stage: Stage) -> Iterator[None]:
-    """One process a run; the second is told who is at it."""
+    """Let one process at a time work in a run; a second one fails with the name of the first."""
     owner = folder.state("owner")
     lock = FileLock(folder.state("lock"))
     try:
@@ -210,7 +210,7 @@ def _readable_failures(stage: Stage, folder: RunFolder, rank: int) -> Iterator[N
 
 
 def _told(error: Exception, folder: RunFolder, log: Path) -> str:
-    """A failure that no stage explained: a disk that cannot be written, or a surprise."""
+    """The sentence for a failure that is no SoftgripError: the disk cannot be written, or a bug."""
     if isinstance(error, OSError) and error.errno in CANNOT_WRITE:
         return str(write_error(Path(error.filename or folder.path), error))
     return f"unexpected {type(error).__name__}: {error}. The trace is in {log}"

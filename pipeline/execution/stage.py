@@ -1,4 +1,4 @@
-"""What a stage is, and what it is given when it runs."""
+"""A stage as data, the folder of its run, and the context that it runs in."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -14,23 +14,23 @@ from pipeline.stopwatch import Stopwatch
 class Stage:
     """One stage of the pipeline, as data.
 
-    Parameters
+    Attributes
     ----------
     name
-        Of its module in stages/, its artifact and its recording.
+        Name of its module in stages/, its artifact and its recording.
     sections
         Configuration sections its artifact depends on.
     upstream
         Stages whose artifacts it reads.
     sharded
-        Its artifact is an index over files in a folder of the same name.
+        Whether its artifact is an index over files in a folder of the same name.
     renders
-        Its pictures come from the renderer that ``cameras.renderer`` names.
+        Whether its pictures come from the renderer that ``cameras.renderer`` names.
     shown
         Configuration that says how much its recording shows.
     drawn_apart
-        Its recording is drawn from its finished artifact, by `drawing_module`, so that what
-        only draws makes the recording anew and leaves the artifact.
+        Whether its recording is drawn from its finished artifact, by `drawing_module`, so that a
+        change of drawing code makes the recording anew and leaves the artifact.
     """
 
     name: str
@@ -54,7 +54,7 @@ class Stage:
 
 @dataclass(frozen=True)
 class RunFolder:
-    """Where everything of one run lies."""
+    """Paths of all files of one run."""
 
     path: Path
 
@@ -84,7 +84,7 @@ class RunFolder:
 
     @property
     def cache(self) -> Path:
-        """What all runs share and can be made again."""
+        """Folder that all runs share; all in it can be made again."""
         return self.path.parent / ".cache"
 
     @property
@@ -95,7 +95,31 @@ class RunFolder:
 
 @dataclass(frozen=True)
 class StageContext:
-    """What a running stage is given."""
+    """What a running stage is given.
+
+    Attributes
+    ----------
+    stage
+        The stage.
+    config
+        The run's configuration.
+    folder
+        Paths of the run.
+    key
+        What the artifact depends on.
+    drawing_key
+        What the recording depends on.
+    inputs
+        Name → file of everything the stage reads.
+    workers
+        Processes to work in.
+    mesh_dir
+        Folder of meshes; None: the embedded objects.
+    executor
+        Whether work runs in local processes or on a Ray cluster.
+    drawing
+        Processor time that the recording costs.
+    """
 
     stage: Stage
     config: RunConfig

@@ -1,4 +1,4 @@
-"""How a stage of a run stands: what it depends on now, what it was made from, and what differs."""
+"""Whether a stage of a run is fresh, and which of the things it depends on changed."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -29,27 +29,31 @@ def stage_context(
     workers: int,
     memo: str = MEMO,
 ) -> StageContext:
-    """Configuration, inputs and keys of a stage as things are now.
+    """Read a stage's configuration, inputs and keys as things are now.
 
     Parameters
     ----------
     stage
-        What it is.
+        The stage.
     folder
-        Where the run lies.
+        Paths of the run.
     inputs_of
-        Name → file of everything a stage reads.
+        Gives name → file of everything a stage reads.
     mesh_dir
-        Folder of meshes; None for the embedded objects.
+        Folder of meshes; None: the embedded objects.
     workers
         Processes to work in.
     memo
-        File of the run's state in which hashes of unchanged inputs are kept.
+        Name of the file, in the run's state, that keeps hashes of unchanged inputs.
+
+    Returns
+    -------
+    The context to run the stage in.
 
     Raises
     ------
     ConfigError
-        Run.toml cannot be used.
+        The run has no plain name, or its run.toml cannot be used.
     ArtifactError
         An upstream artifact is missing.
     MachineError
@@ -152,5 +156,5 @@ def drawn_key(folder: RunFolder, stage: str) -> Key | None:
 
 
 def drawn_note(folder: RunFolder, stage: str) -> Path:
-    """File of the run's state that says what a recording was drawn from and by."""
+    """File of the run's state that holds the key a recording was drawn with."""
     return folder.state(f"{stage}.drawn.json")

@@ -19,12 +19,24 @@ GRIPPER_TYPE = "soft_vacuum"
 def write_acronym(
     folder: Path, grasps: ObjectGrasps, least_quality: float, density: float, friction: float
 ) -> Path:
-    """``meshes/<name>.obj`` and ``grasps/<name>_1.h5`` of one object.
+    """Write ``meshes/<name>.obj`` and ``grasps/<name>_1.h5`` of one object.
 
     Parameters
     ----------
+    folder
+        Folder of the export.
+    grasps
+        All grasps of the object.
     least_quality
-        The q from which on a grasp is a success. density [kg/m3], friction [1].
+        Least q of a grasp that counts as a success.
+    density
+        Of the object [kg/m3].
+    friction
+        Of the object [1].
+
+    Returns
+    -------
+    The HDF5 file.
     """
     item = grasps.item
     mesh_file = f"meshes/{item.name}.obj"

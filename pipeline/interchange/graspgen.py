@@ -16,12 +16,20 @@ LISTS = {"train": "train.txt", "val": "valid.txt", "test": "test.txt"}
 
 
 def write_graspgen(folder: Path, grasps: ObjectGrasps, least_quality: float) -> Path:
-    """``objects/<name>.obj`` and ``grasps/<name>.json`` of one object.
+    """Write ``objects/<name>.obj`` and ``grasps/<name>.json`` of one object.
 
     Parameters
     ----------
+    folder
+        Folder of the export.
+    grasps
+        All grasps of the object.
     least_quality
-        The q from which on a grasp is a success.
+        Least q of a grasp that counts as a success.
+
+    Returns
+    -------
+    The JSON file.
     """
     item = grasps.item
     mesh_file = f"{item.name}.obj"
@@ -40,7 +48,15 @@ def write_graspgen(folder: Path, grasps: ObjectGrasps, least_quality: float) -> 
 
 
 def write_lists(folder: Path, objects: Iterable[tuple[str, str]]) -> None:
-    """The objects of each split, (name, split), as mesh files relative to ``objects``."""
+    """Write the lists of objects of each split, as mesh files relative to ``objects``.
+
+    Parameters
+    ----------
+    folder
+        Folder of the export.
+    objects
+        (name, split) of each object.
+    """
     pairs = sorted(objects)
     for split, name in LISTS.items():
         lines = "".join(f"{item}.obj\n" for item, own in pairs if own == split)

@@ -1,4 +1,4 @@
-"""Grasps by object and in its frame, as datasets of single objects hold them.
+"""Grasps sorted by object and in its frame, as datasets of single objects hold them.
 
 The gripper's base frame of these formats has its +z along the approach, into the object; GCS has
 its +z out of it. Both have their origin at the pad's centre where it first touches.
@@ -22,18 +22,26 @@ GCS_FROM_BASE = np.diag([1.0, -1.0, -1.0, 1.0])
 
 @dataclass(frozen=True)
 class ObjectGrasps:
-    """All grasps of one object, whatever scene they are from; arrays of one length n.
+    """All grasps of one object from all scenes; arrays of one length n.
 
     Attributes
     ----------
+    item
+        The object.
+    split
+        Its split: train, val or test.
     object_from_base
-        (n, 4, 4) gripper base, +z along the approach, in the object's frame.
-    quality, pressure, wrench
-        (n,), (n,), (n, 4) q, p and GW, as labelled in the scene.
+        Gripper base, +z along the approach, in the object's frame, shape (n, 4, 4).
+    quality
+        q as labelled in the scene, shape (n,).
+    pressure
+        p as labelled in the scene, shape (n,).
+    wrench
+        GW as labelled in the scene, shape (n, 4).
     level
-        (n,) of Table II.
+        Level of Table II, shape (n,).
     scene
-        (n,) name of the scene: a label holds among its neighbours.
+        Name of each grasp's scene, n of them: a label holds among the objects of its scene.
     """
 
     item: CatalogueObject
@@ -66,20 +74,23 @@ def split_by_body(
     objects: Mapping[str, tuple[CatalogueObject, str]],
     poses: Mapping[tuple[str, int], Float[np.ndarray, "4 4"]],
 ) -> Iterator[ObjectGrasps]:
-    """The grasps of a batch, body by body, in the frame of the body's object.
+    """Sort the grasps of a batch by body, each in the frame of its object.
 
     Parameters
     ----------
-    origin, grasps
-        A batch: its scene, and its grasps in the world.
+    origin
+        The scene of the batch.
+    grasps
+        Its grasps in WCS.
     objects
-        Name of an object to the object and its split.
+        Name of an object → the object and its split.
     poses
-        Scene and body id to ``world_from_object``.
+        Scene and body id → ``world_from_object``, shape (4, 4).
 
     Yields
     ------
-    The grasps of each body that has any, in the order of body ids.
+    ObjectGrasps
+        The grasps of each body that has any, in the order of body ids.
     """
     for body in np.unique(grasps.body_id):
         rows = np.flatnonzero(grasps.body_id == body)
@@ -99,7 +110,7 @@ def split_by_body(
 
 
 def joined_grasps(parts: Sequence[ObjectGrasps]) -> ObjectGrasps:
-    """Several sets of one object's grasps as one, in order; at least one."""
+    """Join several sets of one object's grasps, in order; at least one."""
     arrays = ("object_from_base", "quality", "pressure", "wrench", "level")
     return ObjectGrasps(
         item=parts[0].item,

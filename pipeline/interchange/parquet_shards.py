@@ -17,11 +17,23 @@ ROW_GROUP = 1024  # samples read at once
 def write_parquet(
     path: Path, samples: Samples, names: tuple[str, ...], prefix: str, first: int
 ) -> None:
-    """One file: a row a sample, clouds and masks as flat lists of fixed length.
+    """Write one file: a row a sample, clouds and masks as flat lists of fixed length.
 
     Clouds, in units of r_G, are stored as f4, which holds every f2 exactly and which every reader
-    knows. names : what ``object_index`` points into. Keys are ``prefix`` and a number, which is
-    ``first`` for the first sample.
+    knows.
+
+    Parameters
+    ----------
+    path
+        The file.
+    samples
+        The samples.
+    names
+        Names of objects that ``object_index`` points into.
+    prefix
+        Beginning of the keys; a number of eight digits follows.
+    first
+        Number of the first sample's key.
     """
     cells = samples.cloud.shape[1]
     cloud = np.ascontiguousarray(samples.cloud, dtype=np.float32).reshape(-1)

@@ -1,4 +1,4 @@
-"""Ranked grasps as JSON and CSV, for a robot's program and for a person."""
+"""Ranked grasps as JSON and CSV, for a robot's program and for a person to read."""
 
 import csv
 import io

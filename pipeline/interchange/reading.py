@@ -1,4 +1,4 @@
-"""What an export reads of a run: grasps by object, and samples by shard."""
+"""Reading a run for export: grasps by object, and samples by shard."""
 
 from pathlib import Path
 
@@ -19,8 +19,16 @@ def grasps_by_object(objects: Path, scenes: Path, grasps: Path) -> list[ObjectGr
 
     Parameters
     ----------
-    objects, scenes, grasps
-        The artifacts of these three stages.
+    objects
+        Artifact of stage objects.
+    scenes
+        Artifact of stage scenes.
+    grasps
+        Artifact of stage grasps (its index).
+
+    Returns
+    -------
+    One entry an object.
 
     Raises
     ------

@@ -15,16 +15,24 @@ CLASSES = tuple(str(kind) for kind in ShapeClass)
 def write_webdataset(
     path: Path, samples: Samples, names: tuple[str, ...], prefix: str, first: int
 ) -> None:
-    """One tar: ``<key>.cloud.npy`` (f2), ``<key>.mask.npy`` (b1) and ``<key>.json`` a sample.
+    """Write one tar: ``<key>.cloud.npy`` (f2), ``<key>.mask.npy`` (b1) and ``<key>.json`` a sample.
 
-    Clouds are (g, g, 3) in units of r_G; the json has q, p, level, class, object, how many pictures
-    the cloud was cut from, and the first proposals it stands for (null where that is unknown).
+    Clouds are (g, g, 3) in units of r_G. The JSON holds q, p, level, class, object, the number of
+    pictures that the cloud was cut from, and the number of first proposals that the sample stands
+    for (null where that is unknown).
 
     Parameters
     ----------
+    path
+        The file.
+    samples
+        The samples.
     names
-        What ``object_index`` points into. Keys are ``prefix`` and a number, which is ``first``
-        for the first sample.
+        Names of objects that ``object_index`` points into.
+    prefix
+        Beginning of the keys; a number of eight digits follows.
+    first
+        Number of the first sample's key.
     """
     with published(path) as scratch, webdataset.TarWriter(str(scratch), mtime=0) as tar:
         for row in range(len(samples)):

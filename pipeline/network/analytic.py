@@ -1,9 +1,9 @@
 """The analytic label on the measured cloud: the baseline that a network has to beat.
 
 The pad is draped on the cells that a camera measured, as Algorithm 1 drapes it on the true surface,
-and the label is computed from there. A camera's noise keeps the pad off the surface, so cells are
-smoothed, a vertex may stay farther off and still touch, and what comes out is put on the scale of
-true labels by a rising function: three choices that are made on training samples.
+and the label is computed from there. Noise of the camera keeps the pad off the surface. Therefore
+cells are smoothed, a vertex may be farther from its cell and still count as touching, and a rising
+function maps the result to true labels. All three are chosen on training samples.
 """
 
 from collections.abc import Sequence
@@ -28,14 +28,14 @@ PART = 2048  # clouds at a time: bounds the memory of their heights
 
 @dataclass(frozen=True)
 class AnalyticBaseline:
-    """The label on a measured cloud, ready to be asked like a network.
+    """The label on a measured cloud, with the same `predict` as a network.
 
     Attributes
     ----------
     gripper
         Pad and physics; the contact tolerance is replaced by ``tolerance``.
     tolerance
-        How far from its cell a vertex still touches, in units of r_G.
+        Largest distance from its cell at which a vertex still touches, in units of r_G.
     smoothing
         Standard deviation of the Gaussian over measured cells, in cells.
     scale
@@ -50,7 +50,19 @@ class AnalyticBaseline:
     def predict(
         self, cloud: Float[np.ndarray, "n g g 3"], mask: Bool[np.ndarray, "n g g"]
     ) -> Float[np.ndarray, " n"]:
-        """Quality in [0, 1] of each cloud, in units of r_G, with its mask of measured cells."""
+        """Quality in [0, 1] of clouds.
+
+        Parameters
+        ----------
+        cloud
+            Points in GCS in units of r_G, shape (n, g, g, 3).
+        mask
+            Cells that hold a measured point, shape (n, g, g).
+
+        Returns
+        -------
+        q-hat, shape (n,).
+        """
         raw = measured_quality(cloud, mask, self.gripper, self.tolerance, self.smoothing)
         return self.scale.predict(raw)
 
@@ -79,6 +91,10 @@ def fit_analytic(
         Contact tolerances to choose among, in units of r_G.
     smoothings
         Standard deviations to choose among, in cells.
+
+    Returns
+    -------
+    The baseline of the lowest mean |q̂ − q|.
     """
     best: tuple[float, AnalyticBaseline] | None = None
     for tolerance, smoothing in product(tolerances, smoothings):
@@ -99,9 +115,10 @@ def measured_quality(
     tolerance: float,
     smoothing: float,
 ) -> Float[np.ndarray, " n"]:
-    """q of S-1.12 with the pad draped on measured cells in the place of the true surface.
+    """q of S-1.12 with the pad draped on measured cells instead of the true surface.
 
-    What a cloud cannot tell is left open: every measured cell counts as the target's.
+    A cloud does not show which object a cell belongs to: every measured cell counts as the
+    target's.
 
     Parameters
     ----------
@@ -112,9 +129,13 @@ def measured_quality(
     gripper
         Pad and physics.
     tolerance
-        How far from its cell a vertex still touches, in units of r_G.
+        Largest distance from its cell at which a vertex still touches, in units of r_G.
     smoothing
         Standard deviation of the Gaussian over measured cells, in cells.
+
+    Returns
+    -------
+    q, shape (n,).
     """
     radius_m = gripper.pad.radius_m
     config = gripper.model_copy(
@@ -139,18 +160,22 @@ def vertex_heights(
 ) -> Float[np.ndarray, "n vertices"]:
     """Height of the measured surface at places of the grid, NaN where nothing was measured.
 
-    Between the four cells around a place heights are interpolated; an unmeasured cell has no say.
+    Heights are interpolated between the four cells around a place; unmeasured cells are left out.
 
     Parameters
     ----------
     cloud
-        Points in units of r_G; y grows with the row, x with the column.
+        Points in units of r_G, shape (n, g, g, 3); y grows with the row, x with the column.
     mask
-        Cells that hold a measured point.
+        Cells that hold a measured point, shape (n, g, g).
     at
         Places in the grid's plane, in units of r_G, shape (vertices, 2).
     smoothing
         Standard deviation of the Gaussian over measured cells, in cells; 0: none.
+
+    Returns
+    -------
+    Heights in units of r_G, shape (n, vertices).
     """
     weight = mask.astype(np.float64)
     height = np.where(mask, cloud[..., 2], 0.0).astype(np.float64)

@@ -1,4 +1,4 @@
-"""What a network has to beat: the mean, and a seal ratio measured by hand."""
+"""Simple baselines that a network has to beat: the mean quality, and a hand-made seal ratio."""
 
 from dataclasses import dataclass
 
@@ -26,7 +26,23 @@ def weighted_mean_predictor_mae(
     test_quality: Float[np.ndarray, " n"],
     test_weight: Float[np.ndarray, " n"],
 ) -> float | None:
-    """The same, mean and error both weighted; None where weights are unknown or all zero."""
+    """Mean |q̂ − q| of predicting the training samples' weighted mean, weighted itself.
+
+    Parameters
+    ----------
+    train_quality
+        q of the training samples, shape (m,).
+    train_weight
+        Their weights, shape (m,).
+    test_quality
+        q of the test samples, shape (n,).
+    test_weight
+        Their weights, shape (n,).
+
+    Returns
+    -------
+    The error; None where weights are unknown (NaN) or all zero.
+    """
     weight = train_weight.astype(np.float64)
     if not weight.sum() > 0:
         return None
@@ -42,20 +58,24 @@ def seal_ratio(
 ) -> Float[np.ndarray, " n"]:
     """Share of the cells under Reg.V that are seen and lie near the plane through them.
 
-    A hand-made stand-in for the contact share of Eq. (2), from the cloud alone. The plane is
+    A hand-made replacement for the contact share of Eq. (2), from the cloud alone. The plane is
     fitted twice: to all seen cells of Reg.V, then to those within ``tolerance`` of their median
     residual, so that an edge within Reg.V does not tilt it.
 
     Parameters
     ----------
     cloud
-        Points in GCS in units of r_G.
+        Points in GCS in units of r_G, shape (n, h, w, 3).
     mask
-        Cells that hold a measured point.
+        Cells that hold a measured point, shape (n, h, w).
     seal_radius
         r_v in units of r_G.
     tolerance
         Distance from the plane that still counts as near, in units of r_G.
+
+    Returns
+    -------
+    Ratio in [0, 1], shape (n,); 0 where too few cells are seen to fit a plane.
     """
     n = len(mask)
     points = np.where(mask[..., None], cloud, 0).astype(np.float64)

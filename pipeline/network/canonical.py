@@ -132,9 +132,15 @@ def apply_symmetry(
     Parameters
     ----------
     inputs
-        Canonical inputs on a square grid, h = w, of ``channels``.
+        Canonical inputs on a square grid, shape (b, c, h, w) with h = w.
     elements
-        Integers in [0, 8).
+        Integers in [0, 8), shape (b,).
+    channels
+        Names of the c channels, one of ``KNOWN_CHANNELS``.
+
+    Returns
+    -------
+    The turned and mirrored inputs, shape (b, c, h, w).
     """
     b, c, h, w = inputs.shape
     sources, matrices = _symmetry_tables(h, inputs.device)
@@ -148,7 +154,7 @@ def apply_symmetry(
 
 
 def inverse_symmetry(elements: Int[Tensor, " b"]) -> Int[Tensor, " b"]:
-    """Element that undoes each: a turn's opposite; what mirrors undoes itself."""
+    """Element that undoes each, shape (b,): the opposite turn; a mirrored one undoes itself."""
     return torch.where(elements < 4, (4 - elements) % 4, elements)
 
 

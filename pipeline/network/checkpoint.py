@@ -1,4 +1,4 @@
-"""A trained network as bytes: safetensors with the configuration beside; loading runs no code."""
+"""A trained network as bytes: safetensors with its configuration; loading runs no code."""
 
 import hashlib
 import json
@@ -36,7 +36,16 @@ def save_checkpoint_bytes(network: GaCnn) -> bytes:
 
 
 def load_checkpoint_bytes(data: bytes) -> GaCnn:
-    """The network of a checkpoint, on the CPU and ready to predict.
+    """Read the network of a checkpoint.
+
+    Parameters
+    ----------
+    data
+        Bytes that `save_checkpoint_bytes` made.
+
+    Returns
+    -------
+    The network, on the CPU and ready to predict.
 
     Raises
     ------
@@ -90,7 +99,7 @@ def tensors_to_bytes(tensors: Mapping[str, Tensor], metadata: Mapping[str, str])
     """Safetensors bytes with a digest of the payload; equal content gives equal bytes.
 
     The library writes metadata in the order of a hash map, which differs from run to run: the
-    header is written anew with its keys in order.
+    header is therefore written again with its keys in order.
     """
     plain = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
     data = save(plain, dict(metadata))
@@ -105,12 +114,23 @@ def tensors_to_bytes(tensors: Mapping[str, Tensor], metadata: Mapping[str, str])
 
 
 def tensors_from_bytes(data: bytes, what: str) -> tuple[dict[str, Tensor], dict[str, str]]:
-    """Tensors and metadata of safetensors bytes.
+    """Read tensors and metadata from safetensors bytes.
+
+    Parameters
+    ----------
+    data
+        Bytes that `tensors_to_bytes` made.
+    what
+        What error messages call the bytes.
+
+    Returns
+    -------
+    Name → tensor, and the metadata without the digest.
 
     Raises
     ------
     ContentError
-        The bytes are not whole safetensors; the message calls them ``what``.
+        The bytes are no safetensors, or do not match their digest.
     """
     try:
         tensors = load(data)

@@ -29,14 +29,21 @@ _PART = 8
 
 
 class ControlPredictor:
-    """An exported network, loaded and ready: what control asks for quality.
+    """An exported network, loaded and ready to predict quality for control.
 
-    A grasp's quality is the same bytes whatever is asked with it, on any number of threads: each
-    part of a batch is of one size and run by one thread.
+    A grasp's quality is the same bytes whichever grasps are asked with it, on any number of
+    threads: each part of a batch is of one size and run by one thread.
     """
 
     def __init__(self, data: bytes, threads: int) -> None:
-        """Load ``export_onnx_bytes``' bytes to run on ``threads`` threads of the CPU.
+        """Load an exported network.
+
+        Parameters
+        ----------
+        data
+            Bytes that ``export_onnx_bytes`` made.
+        threads
+            Threads of the CPU to run on.
 
         Raises
         ------
@@ -57,7 +64,18 @@ class ControlPredictor:
     def predict(
         self, cloud: Float[np.ndarray, "n h w 3"], mask: Bool[np.ndarray, "n h w"]
     ) -> Float[np.ndarray, " n"]:
-        """Predicted quality q̂ in [0, 1]; clouds and masks as for ``inference.predict``.
+        """Predicted quality q̂ in [0, 1].
+
+        Parameters
+        ----------
+        cloud
+            Points in GCS in units of r_G, shape (n, h, w, 3), grid as in ``canonical``.
+        mask
+            Cells that hold a measured point, shape (n, h, w).
+
+        Returns
+        -------
+        q̂ in single precision, shape (n,).
 
         Raises
         ------
@@ -83,7 +101,7 @@ class ControlPredictor:
     def _input(
         self, cloud: Float[np.ndarray, "n h w 3"], mask: Bool[np.ndarray, "n h w"]
     ) -> Float[np.ndarray, "n c h w"]:
-        """The network's input; networks of older channels are not in a hurry."""
+        """The network's input; for older channels the tensor version, which is slower."""
         if self._channels == CHANNELS:
             return control_input(cloud, mask)
         with reproducible(threads=1), torch.inference_mode():
@@ -104,8 +122,22 @@ def checked_against(
 
     Parameters
     ----------
-    batch_size, threads
-        Of the network; the predictor has its own.
+    predictor
+        The exported network.
+    network
+        The network that it was exported from.
+    cloud
+        Points in GCS in units of r_G, shape (n, h, w, 3).
+    mask
+        Cells that hold a measured point, shape (n, h, w).
+    batch_size
+        Clouds that ``network`` predicts at a time.
+    threads
+        Threads that ``network`` runs on.
+
+    Returns
+    -------
+    The difference.
 
     Raises
     ------

@@ -1,7 +1,7 @@
-"""The network's input for control: what ``canonical.network_input`` makes, compiled.
+"""The network's input for control: the result of ``canonical.network_input``, compiled.
 
-A control step prepares some fifty clouds. As tensors each of their seventy operations is a pass
-over memory; here a cloud stays in the cache from its first cell to its last.
+A control step prepares some fifty clouds. Computed with tensors, each of the seventy operations on
+them reads and writes all of memory; here a cloud stays in the cache from first cell to last.
 """
 
 import math
@@ -29,9 +29,10 @@ _X, _Y, _X_IN_CELL, _Y_IN_CELL, _Z, _Z_FINE, _RADIUS, _SEEN, _PAD_GAP, _PAD_CONT
 
 
 class _Lengths(NamedTuple):
-    """What is defined elsewhere, in single precision, as the tensors are.
+    """Lengths of other modules, in single precision, as the tensors are.
 
-    Handed over: the disk cache would keep a constant of another module as it was when compiled.
+    They are arguments, as numba's disk cache would keep the value that a constant of another module
+    had when the function was compiled.
     """
 
     beside: np.float32 = np.float32(CELL_SIDE)
@@ -55,8 +56,14 @@ def control_input(
 
     Parameters
     ----------
-    cloud, mask
-        As for ``canonical.network_input``.
+    cloud
+        Points in GCS in units of r_G, shape (b, h, w, 3); unseen cells may hold anything.
+    mask
+        Cells that hold a measured point, shape (b, h, w).
+
+    Returns
+    -------
+    The channels, shape (b, c, h, w), zero in unseen cells.
     """
     count, height, width = mask.shape
     inputs = np.zeros((count, len(CHANNELS), height, width), dtype=np.float32)

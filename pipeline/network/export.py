@@ -1,4 +1,4 @@
-"""GA-CNN for control as ONNX: bytes out, and the bounds that bytes from outside are held to."""
+"""GA-CNN for control as ONNX bytes, and the checks of such bytes before they are run."""
 
 import copy
 import json
@@ -52,14 +52,18 @@ class ExportedInput:
 
 
 def export_onnx_bytes(network: GaCnn, cells: int) -> bytes:
-    """The network as ONNX for canonical inputs of any batch; equal networks give equal bytes.
+    """Export a network as ONNX for canonical inputs of any batch; equal networks give equal bytes.
 
     Parameters
     ----------
     network
-        What is exported; it stays as it is.
+        The network; it is not changed.
     cells
-        Cells a side of the clouds that it will be asked about.
+        Cells a side of the clouds that it will predict.
+
+    Returns
+    -------
+    The bytes.
     """
     example = torch.zeros(2, len(network.channels), cells, cells)
     network = _without_matrix_products(network).eval()
@@ -111,11 +115,16 @@ def _without_matrix_products(network: GaCnn) -> GaCnn:
 
 
 def check_onnx_bytes(data: bytes) -> ExportedInput:
-    """Hold bytes against what ``export_onnx_bytes`` makes, before anything runs them.
+    """Check that bytes are an export of ``export_onnx_bytes``, before anything runs them.
+
+    Parameters
+    ----------
+    data
+        The bytes.
 
     Returns
     -------
-    What it takes.
+    Channels and cells of the network's input.
 
     Raises
     ------
@@ -163,9 +172,9 @@ def _weights(model: onnx.ModelProto) -> Iterator[onnx.TensorProto]:
 
 
 def _check_bounded(model: onnx.ModelProto) -> None:
-    """Hold what a model would allocate, loaded or run, against what a GA-CNN needs.
+    """Check that a model allocates no more than a GA-CNN does, when loaded or run.
 
-    A runtime folds what does not depend on its input when it is made, whatever it grows to.
+    A runtime computes at loading what does not depend on the input, whatever its size.
     """
     graph = model.graph
     unknown = sorted({str(node.op_type) for node in graph.node} - _OPERATORS)  # may be bytes

@@ -40,8 +40,12 @@ class Member:
     ----------
     group
         "family" of Fig. 1, or "ablation".
+    variant
+        Which part is left out; "ga-cnn": none.
+    network
+        Depth, channels and attention.
     seed
-        Of its weights and its order of samples.
+        Seed of its weights and of its order of samples.
     """
 
     group: Literal["family", "ablation"]
@@ -51,12 +55,12 @@ class Member:
 
     @property
     def augment(self) -> bool:
-        """Whether it is shown turned and mirrored clouds, and averaged over them."""
+        """Whether it trains on turned and mirrored clouds, and predictions average over them."""
         return self.variant != "no augmentation"
 
     @property
     def name(self) -> str:
-        """Unlike any other member's; fit for a file."""
+        """A name for files that no other member has."""
         channels = "-".join(map(str, self.network.channels))
         variant = self.variant.replace(" ", "-")
         return f"{self.group}-{variant}-{self.network.layers}-{channels}-{self.seed}"
@@ -68,17 +72,23 @@ class MemberFigures:
 
     Attributes
     ----------
-    val_mae, val_mae_spread
-        Of the best epoch, and the standard error of that mean.
+    val_mae
+        Validation error of the best epoch.
+    val_mae_spread
+        Standard error of that mean.
     test_mae
         ``test_mae_averaged`` where the member was trained with symmetries, else
         ``test_mae_single``.
-    test_mae_single, test_mae_averaged
-        Of one prediction a grasp, and of the mean over its symmetries.
+    test_mae_single
+        Test error of one prediction a grasp.
+    test_mae_averaged
+        Test error of the mean over a grasp's symmetries.
     by_class
-        Name of a shape class to test error.
-    parameters, multiply_adds
-        Its size, and its cost a grasp.
+        Name of a shape class → test error.
+    parameters
+        Trained numbers of the network.
+    multiply_adds
+        Multiplications with addition for one grasp.
     """
 
     val_mae: float
@@ -92,12 +102,25 @@ class MemberFigures:
 
 
 def members(sweep: SweepConfig, of_run: NetworkConfig, seed: int) -> list[Member]:
-    """The family, depth by depth within each channel set, then the ablation of ``of_run``.
+    """The members to train: the family, by channel set and then depth, then the ablation.
+
+    Parameters
+    ----------
+    sweep
+        Depths and channel sets of the family, and seeds of the ablation.
+    of_run
+        The network that parts are left out of.
+    seed
+        Seed of the family, and the ablation's first.
+
+    Returns
+    -------
+    The members in the order to train them.
 
     Raises
     ------
     ConfigError
-        a depth or a channel set is no member's.
+        A depth or a channel set is no member's.
     """
     family = [
         Member("family", "ga-cnn", NetworkConfig(layers=layers, channels=channels), seed)
@@ -122,9 +145,9 @@ def members(sweep: SweepConfig, of_run: NetworkConfig, seed: int) -> list[Member
 
 
 def budgeted(sweep: SweepConfig, split: str, samples: Samples) -> Samples:
-    """What every member gets of a split ("train", "val" or "test"): its first samples.
+    """The samples of a split ("train", "val" or "test") that every member gets: the first ones.
 
-    A split is shuffled, so that its first samples are a fair part of it.
+    A split is shuffled, so that its first samples represent it.
     """
     wanted = sweep.samples if split == "train" else sweep.held_out_samples
     return samples.take(slice(0, wanted))
@@ -144,13 +167,16 @@ def measure_member(
 
     Parameters
     ----------
-    member, trained
-        What was trained, and what came of it.
+    member
+        What was to be trained.
+    trained
+        The result of the training.
     config
         Batch size and threads to predict with.
-    val, test
-        Held-out samples: the spread of the validation error is of the first, the test errors of
-        the second.
+    val
+        Held-out samples of which the spread of the validation error is taken.
+    test
+        Held-out samples of which the test errors are taken.
 
     Returns
     -------
@@ -177,9 +203,9 @@ def measure_member(
 
 
 def time_network_ms(config: NetworkConfig, test: Samples, batch: int, threads: int) -> float:
-    """Milliseconds a grasp of a network of this make on the CPU, in batches of ``batch``.
+    """Milliseconds a grasp of a network of this configuration on the CPU, in batches of ``batch``.
 
-    Its weights are drawn at random, as they change no time.
+    Its weights are drawn at random, as they do not change the time.
     """
     network = build_network(config, seed=0)
 

@@ -14,7 +14,16 @@ BINS = 10  # of q in a histogram: tenths
 class BinnedError:
     """Error over the samples whose true quality lies in [low, high).
 
-    ``mae`` is None where the bin is empty.
+    Attributes
+    ----------
+    low
+        Lower end of the bin.
+    high
+        Upper end of the bin.
+    count
+        Samples in it.
+    mae
+        Mean |q̂ − q|; None where the bin is empty.
     """
 
     low: float
@@ -27,7 +36,20 @@ class BinnedError:
 class CalibrationBin:
     """Predicted against true quality where the prediction lies in [low, high).
 
-    The means are None where the bin is empty. Calibrated predictions have equal means.
+    Calibrated predictions have equal means.
+
+    Attributes
+    ----------
+    low
+        Lower end of the bin.
+    high
+        Upper end of the bin.
+    count
+        Samples in it.
+    mean_predicted
+        Mean q̂; None where the bin is empty.
+    mean_quality
+        Mean q; None where the bin is empty.
     """
 
     low: float
@@ -41,6 +63,17 @@ def mean_absolute_error(
     predicted: Float[np.ndarray, " n"], quality: Float[np.ndarray, " n"]
 ) -> float:
     """Mean |q̂ − q|, the prediction error of Supplement IV.
+
+    Parameters
+    ----------
+    predicted
+        q̂, shape (n,).
+    quality
+        q, shape (n,).
+
+    Returns
+    -------
+    The error.
 
     Raises
     ------

@@ -63,6 +63,15 @@ _SPATIAL_ATTENTION_KERNEL = 3
 def blocks_per_stage(layers: int) -> tuple[int, int, int, int]:
     """Blocks of the four stages for a depth of ``layers`` weighted layers.
 
+    Parameters
+    ----------
+    layers
+        Weighted layers: an even number from 18 to 102.
+
+    Returns
+    -------
+    n₁ to n₄.
+
     Raises
     ------
     ConfigError
@@ -81,7 +90,7 @@ def blocks_per_stage(layers: int) -> tuple[int, int, int, int]:
 
 
 class ChannelAttention(nn.Module):
-    """Weigh channels by what their mean and their maximum over the map say."""
+    """Scale channels by weights computed from their mean and maximum over the map."""
 
     def __init__(self, channels: int) -> None:
         super().__init__()
@@ -99,7 +108,7 @@ class ChannelAttention(nn.Module):
 
 
 class SpatialAttention(nn.Module):
-    """Weigh cells by what the mean and the maximum over their channels say."""
+    """Scale cells by weights computed from the mean and maximum over their channels."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -199,7 +208,20 @@ class GaCnn(nn.Module):
 
 
 def build_network(config: NetworkConfig, seed: int, channels: Channels = CHANNELS) -> GaCnn:
-    """A network with initial weights drawn from ``seed``; global generators stay as they are.
+    """Build a network with initial weights drawn from a seed; global generators are not changed.
+
+    Parameters
+    ----------
+    config
+        Depth, channels and attention.
+    seed
+        Seed of the weights.
+    channels
+        Channels of its input, one of ``canonical.KNOWN_CHANNELS``.
+
+    Returns
+    -------
+    The network, on the CPU.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A trained network on objects that it never saw, beside what it has to beat; Supplement IV."""
+"""Errors of a trained network on held-out objects, beside those of the baselines; Supplement IV."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -38,31 +38,39 @@ class TestFigures:
 
     Attributes
     ----------
-    quality, predicted
-        q and q̂ of the n test samples, shape (n,).
+    quality
+        q of the n test samples, shape (n,).
+    predicted
+        q̂ of the n test samples, shape (n,).
     mae
         The error, averaged over the symmetries where the network was trained with them.
     mae_single
-        The same without averaging over the symmetries.
-    mae_as_proposed, mean_predictor_mae_as_proposed
-        Over grasps as the first round draws them (``Samples.proposal_weight``), where labels
-        are not balanced; None where that is unknown.
-    mean_predictor_mae, seal_ratio_mae
-        Errors of the baselines.
+        The error of one prediction a grasp.
+    mae_as_proposed
+        The error over grasps as the first round draws them (``Samples.proposal_weight``), where
+        labels are not balanced; None where that is unknown.
+    mean_predictor_mae
+        Error of predicting the training samples' mean.
+    mean_predictor_mae_as_proposed
+        The same over grasps as the first round draws them; None where that is unknown.
+    seal_ratio_mae
+        Error of the baseline by `seal_ratio`.
     by_class
-        Name of a shape class to error.
+        Name of a shape class → error.
     by_pictures
-        "1 picture", "3 pictures", ... that clouds were cut from, to error and samples.
+        "1 picture", "3 pictures", ... that clouds were cut from → error and samples.
     first_proposals
         Samples of the first round, those that ``mae_as_proposed`` is over.
     count_by_class
-        Name of a shape class to samples.
+        Name of a shape class → samples.
     by_tenth
         Error by tenth of q, None where empty.
     calibration
         By tenth of q̂: mean q̂ and mean q (None where empty), count.
-    train_count, val_count
-        Samples that the network learned from and was chosen by.
+    train_count
+        Samples that the network was trained on.
+    val_count
+        Samples that the best epoch was chosen by.
     """
 
     __test__ = False  # not a test case, whatever its name
@@ -107,22 +115,26 @@ def measure_held_out(
     val_set: Samples,
     test_set: Samples,
 ) -> TestFigures:
-    """The network's error on the test split, and that of what it has to beat.
+    """Errors of the network and of the baselines on the test split.
 
     Parameters
     ----------
     network
-        Trained on ``train_set``, chosen by ``val_set``.
+        Trained on ``train_set``, best epoch chosen by ``val_set``.
     config
         Batch size and threads to predict with; whether symmetries are averaged over.
     pad
-        Its r_v, r_G and steps, for the seal ratio measured by hand.
-    train_set, val_set, test_set
-        The three splits, of different objects.
+        Its r_v, r_G and steps, for the baseline by `seal_ratio`.
+    train_set
+        Training samples; the baselines are fitted on them.
+    val_set
+        Validation samples, of other objects.
+    test_set
+        Test samples, of other objects.
 
     Returns
     -------
-    The figures; baselines are fitted on ``train_set``.
+    The figures.
     """
     quality, shape_class = np.asarray(test_set.quality), CLASSES[test_set.shape_class]
     single, averaged = (

@@ -17,17 +17,27 @@ def predict(
     threads: int,
     average_symmetries: bool,
 ) -> Float[np.ndarray, " n"]:
-    """Predicted quality q̂ in [0, 1] of sample clouds, single precision.
+    """Predicted quality q̂ in [0, 1] of sample clouds.
 
     Parameters
     ----------
+    model
+        The network.
     cloud
-        Points in GCS in units of r_G, grid as in ``canonical``.
+        Points in GCS in units of r_G, shape (n, h, w, 3), grid as in ``canonical``.
     mask
-        Cells that hold a measured point.
+        Cells that hold a measured point, shape (n, h, w).
+    batch_size
+        Clouds at a time.
+    threads
+        Threads of PyTorch.
     average_symmetries
         Mean over the eight turns and mirrors under which q does not change: a lower error at
         eight times the cost.
+
+    Returns
+    -------
+    q̂ in single precision, shape (n,).
     """
     model.eval()
     predicted = np.empty(len(cloud), dtype=np.float32)

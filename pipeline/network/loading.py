@@ -1,4 +1,4 @@
-"""Samples to batches: who sees which sample when, and how it is read.
+"""From samples to batches: the order of an epoch, each process's part, and reading.
 
 Samples lie decoded in memory-mapped arrays (``messages.sample_cache``), so a batch of any samples
 costs a copy of their bytes. An epoch is one permutation of *all* samples, across shards, that
@@ -40,12 +40,25 @@ def epoch_batches(
 def part_of_rank(
     batches: list[Int[np.ndarray, " _"]], rank: int, ranks: int
 ) -> list[Int[np.ndarray, " _"]]:
-    """What one of ``ranks`` processes reads of each batch, in the order of the file.
+    """The samples that one of several processes reads of each batch, in the order of the file.
+
+    Parameters
+    ----------
+    batches
+        Indices of the samples of each batch.
+    rank
+        Number of the process.
+    ranks
+        Number of processes.
+
+    Returns
+    -------
+    Sorted indices for each batch.
 
     Raises
     ------
     ConfigError
-        a batch has fewer samples than there are processes.
+        A batch has fewer samples than there are processes.
     """
     smallest = min(len(batch) for batch in batches)
     if smallest < ranks:
@@ -81,12 +94,23 @@ class SampleBatches(Dataset[RawBatch]):
 def load_batches(
     samples: GraspTensors, batches: list[Int[np.ndarray, " _"]], workers: int, pinned: bool
 ) -> Iterator[RawBatch]:
-    """The batches in order, read by this process or ahead of it by ``workers`` others.
+    """Read the batches in order, in this process or ahead of it in others.
 
     Parameters
     ----------
+    samples
+        The samples.
+    batches
+        Indices of the samples of each batch.
+    workers
+        Processes that read ahead; 0: this one reads.
     pinned
-        Batches are put where a GPU copies from fastest.
+        Whether batches are put in memory that a GPU copies from fastest.
+
+    Yields
+    ------
+    RawBatch
+        Indices, clouds, masks and qualities of each batch.
     """
     items = SampleBatches(samples, batches)
     if not workers and not pinned:
@@ -109,7 +133,7 @@ class Waiting:
         self.working_s = 0.0
 
     def watch(self, items: Iterable[T]) -> Iterator[T]:
-        """Pass items through, booking the time before and after each."""
+        """Yield the items, adding up the time before and after each."""
         iterator = iter(items)
         asked = time.perf_counter()
         for item in iterator:
@@ -120,6 +144,6 @@ class Waiting:
             self.working_s += asked - given
 
     def share_of(self, seconds: float) -> float | None:
-        """So many seconds over all time, waiting and working; None before the first item."""
+        """``seconds`` over all time, waiting and working; None before the first item."""
         total = self.waiting_s + self.working_s
         return seconds / total if total else None

@@ -1,8 +1,8 @@
-"""The pad draped on what the camera measured: S-1.07 on the organised cloud.
+"""The pad draped on the measured cells: S-1.07 on the organised cloud.
 
-The label rests on where the pad comes to lie on the surface, and a convolution finds that hard:
-one high cell holds the pad off all that lies near it. So the network is told. On the cloud's own
-grid of square cells the definition of `pipeline.gripper.draping` reads
+The label depends on where the pad lies on the surface, and a convolution learns that badly: one
+high cell holds the pad off all that lies near it. The draped pad is therefore an input of the
+network. On the cloud's own grid of square cells the definition of `pipeline.gripper.draping` reads
 
     z(v) = max over seen u of  z_s(u) - s d(u, v),
 
@@ -28,18 +28,19 @@ NOTHING = -1e3
 
 
 def draped_gap(z: Float[Tensor, "b h w"], seen: Bool[Tensor, "b h w"]) -> Float[Tensor, "b h w"]:
-    """How far the draped pad stays above each seen cell, in units of r_G; 0 where unseen.
+    """Height of the draped pad above each seen cell, in units of r_G; 0 where unseen.
 
     Parameters
     ----------
     z
-        Heights of the cells in GCS, in units of r_G.
+        Heights of the cells in GCS, in units of r_G, shape (b, h, w).
     seen
-        Cells that hold a measured point under the pad; the others hold nothing up.
+        Cells that hold a measured point under the pad, shape (b, h, w); others do not hold the pad
+        up.
 
     Returns
     -------
-    z(v) - z_s(v) >= 0, at most ``REACH``: 0 is a cell the pad lies on.
+    z(v) - z_s(v) in [0, ``REACH``], shape (b, h, w): 0 in a cell that the pad lies on.
     """
     surface = torch.where(seen, z, NOTHING)
     draped = surface

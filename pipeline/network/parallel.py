@@ -1,4 +1,4 @@
-"""Several processes that train one network: what each must know and exchange.
+"""Training one network in several processes: their numbers, and sums over them.
 
 ``torchrun --nproc-per-node=N -m -- stages.train --run NAME`` starts N equal processes. Each
 computes the gradients of its part of a batch; ``DistributedDataParallel`` averages them, so all
@@ -25,9 +25,9 @@ class Ranks:
     rank
         Its number, 0 for the one that saves and reports.
     count
-        How many there are.
+        Number of processes.
     local
-        Its number on this machine, that of the GPU it takes.
+        Its number on this machine, which is that of the GPU it uses.
     """
 
     rank: int = 0
@@ -51,7 +51,7 @@ ALONE = Ranks()
 
 @contextmanager
 def joined_ranks() -> Iterator[Ranks]:
-    """Join the processes that torchrun started with this one; alone without torchrun."""
+    """Join the processes that torchrun started with this one; `ALONE` without torchrun."""
     count = int(os.environ.get("WORLD_SIZE", "1"))
     if count == 1:
         yield ALONE
@@ -67,7 +67,7 @@ def joined_ranks() -> Iterator[Ranks]:
 
 
 class _SumOverRanks(torch.autograd.Function):
-    """Sum over all processes, through which gradients pass: they add up as well."""
+    """Sum over all processes; gradients are summed in the same way."""
 
     @staticmethod
     def forward(context: object, values: Tensor) -> Tensor:
@@ -85,7 +85,7 @@ class _SumOverRanks(torch.autograd.Function):
 class SyncedBatchNorm(nn.BatchNorm2d):
     """Batch normalisation over the batch of all processes.
 
-    Of its own because ``torch.nn.SyncBatchNorm`` refuses tensors on a CPU.
+    A class of our own, because ``torch.nn.SyncBatchNorm`` refuses tensors on a CPU.
     """
 
     def forward(self, input: Float[Tensor, "b c h w"]) -> Float[Tensor, "b c h w"]:  # noqa: A002
@@ -114,7 +114,7 @@ class SyncedBatchNorm(nn.BatchNorm2d):
 
 
 def with_synced_norms(module: nn.Module) -> None:
-    """Let every batch normalisation of a network see the whole batch; its weights stay its own."""
+    """Replace every batch normalisation of a network by `SyncedBatchNorm`, weights kept."""
     for name, child in module.named_children():
         if isinstance(child, nn.BatchNorm2d):
             synced = SyncedBatchNorm(child.num_features, child.eps, child.momentum)

@@ -1,4 +1,4 @@
-"""Where a training stands, kept on disk so that a killed one goes on as if it never stopped."""
+"""The state of a training on disk, so that a killed one resumes and arrives at the same bytes."""
 
 import json
 from dataclasses import asdict, dataclass
@@ -18,7 +18,7 @@ STATE_FILE = "training.safetensors"
 
 @dataclass(frozen=True)
 class EpochMetrics:
-    """One epoch in figures.
+    """Figures of one epoch.
 
     Attributes
     ----------
@@ -27,7 +27,7 @@ class EpochMetrics:
     learning_rate
         At the epoch's last step.
     train_loss
-        Mean loss over the epoch's samples, as they were seen (augmented, in training).
+        Mean loss over the epoch's samples, turned and mirrored as in training.
     train_mae
         Mean |q̂ − q| over the same.
     val_mae
@@ -53,11 +53,11 @@ class Standing:
     history
         The finished epochs.
     best_weights
-        Of the epoch with the lowest validation error; initial ones before any.
+        Weights of the epoch with the lowest validation error; initial ones before any.
     batch
-        Batches done of the epoch that runs.
+        Batches done of the current epoch.
     sums
-        Loss, |q̂ − q| and samples, summed over those batches and all processes.
+        Loss, |q̂ − q| and samples, summed over those batches and all processes, shape (3,).
     """
 
     history: list[EpochMetrics]
@@ -69,12 +69,20 @@ class Standing:
 def save_standing(
     path: Path, identity: str, model: GaCnn, optimizer: torch.optim.AdamW, standing: Standing
 ) -> None:
-    """Everything the next batch needs; schedule and generators follow from its number.
+    """Save all that the next batch needs; schedule and generators follow from its number.
 
     Parameters
     ----------
+    path
+        The file.
     identity
         All that the training's result depends on, as text.
+    model
+        The network as it is now.
+    optimizer
+        Its optimizer.
+    standing
+        How far the training has come.
     """
     tensors = {f"model/{name}": tensor for name, tensor in model.state_dict().items()}
     tensors |= {f"best/{name}": tensor for name, tensor in standing.best_weights.items()}
@@ -93,7 +101,24 @@ def save_standing(
 def load_standing(
     path: Path, identity: str, model: GaCnn, optimizer: torch.optim.AdamW, fresh: Standing
 ) -> Standing:
-    """Put a saved state in place and return it; ``fresh`` where it is of another training.
+    """Load a saved state into network and optimizer.
+
+    Parameters
+    ----------
+    path
+        The file.
+    identity
+        All that the training's result depends on, as text.
+    model
+        Receives the saved weights.
+    optimizer
+        Receives the saved moments.
+    fresh
+        State of a training that begins.
+
+    Returns
+    -------
+    The saved state; ``fresh`` where the file has another identity, and nothing is loaded.
 
     Raises
     ------

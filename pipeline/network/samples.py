@@ -1,4 +1,4 @@
-"""What training reads of a dataset, and the part of it that the network learns from."""
+"""Samples of a dataset as arrays, and the part of them that the network learns from."""
 
 import hashlib
 from dataclasses import dataclass, fields
@@ -72,24 +72,30 @@ class GraspTensors:
 
 @dataclass(frozen=True)
 class Samples:
-    """What training reads; arrays of one length n.
+    """Samples of a dataset; arrays of one length n.
 
     Attributes
     ----------
-    cloud, cloud_mask
-        (n, g, g, 3) and (n, g, g), units of r_G, origin at the contact.
-    quality, pressure
-        (n,) q and p.
-    shape_class
-        (n,) 0 basic, 1 typical, 2 complex.
+    cloud
+        Points in GCS in units of r_G, origin at the contact, shape (n, g, g, 3).
+    cloud_mask
+        Cells that hold a measured point, shape (n, g, g).
+    quality
+        q, shape (n,).
     object_index
-        (n,) into the catalogue's names, kept beside.
+        Index into the catalogue's names, which are kept elsewhere, shape (n,).
+    shape_class
+        0 basic, 1 typical, 2 complex, shape (n,).
+    level
+        Level of Table II, shape (n,).
+    pressure
+        p, shape (n,).
     proposal_weight
-        (n,) how many grasps of the first round, drawn as S-1.04 - S-1.06 say and before labels
-        were balanced, a sample stands for; 0 for one proposed near a rare label. NaN where the
-        shards, of an older program, do not say.
+        Number of grasps of the first round, drawn as S-1.04 - S-1.06 say and before labels were
+        balanced, that a sample stands for, shape (n,); 0 for one proposed near a rare label. NaN
+        where the shards, of an older program, do not say.
     pictures
-        (n,) how many pictures the cloud was cut from.
+        Number of pictures the cloud was cut from, shape (n,).
     """
 
     cloud: Float[np.ndarray, "n g g 3"]
@@ -111,12 +117,12 @@ class Samples:
         return GraspTensors(self.cloud, self.cloud_mask, self.quality)
 
     def take(self, chosen: Integer[np.ndarray, " k"] | slice) -> "Samples":
-        """Those at the given indices."""
+        """The samples at the given indices."""
         return Samples(*(getattr(self, f.name)[chosen] for f in fields(self)))
 
 
 def joined_samples(parts: list[Samples]) -> Samples:
-    """Several sets as one, in order; at least one."""
+    """Join several sets, in order; at least one."""
     return Samples(
         *(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Samples))
     )

@@ -1,4 +1,4 @@
-"""What predicts quality: the released network, a file of one's own, or the analytic baseline."""
+"""Sources of predicted quality: the released network, a network's file, the analytic baseline."""
 
 import hashlib
 import json
@@ -26,12 +26,12 @@ Predict = Callable[
 
 @dataclass(frozen=True)
 class QualitySource:
-    """Something that gives q-hat for clouds.
+    """Something that predicts the quality of clouds.
 
     Attributes
     ----------
     name
-        What people are told.
+        Its name in messages.
     predict
         Clouds in units of r_G, shape (n, g, g, 3), and masks → q-hat, shape (n,).
     digest
@@ -44,7 +44,7 @@ class QualitySource:
 
 
 def quality_source(named: str, gripper: GripperConfig, threads: int) -> QualitySource:
-    """What a person named: ``released``, ``analytic``, or the path of an exported network.
+    """Open a source: ``released``, ``analytic``, or the path of an exported network.
 
     Parameters
     ----------
@@ -53,12 +53,16 @@ def quality_source(named: str, gripper: GripperConfig, threads: int) -> QualityS
     gripper
         Pad and physics, for the analytic baseline.
     threads
-        Of the CPU, for a network.
+        Threads of the CPU, for a network.
+
+    Returns
+    -------
+    The source.
 
     Raises
     ------
     ArtifactError
-        The file is not there, or is no network of this project.
+        The file is missing, or is no network of this project.
     """
     if named == ANALYTIC:
         data = _bytes(RELEASED_FOLDER / BASELINE_FILE)

@@ -1,4 +1,4 @@
-"""Milliseconds a grasp, as a caller of a predictor sees it: cloud in, quality out."""
+"""Milliseconds a grasp of a predictor, from cloud to quality."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -26,16 +26,24 @@ def milliseconds_a_grasp(
     batches: Sequence[int] = BATCHES,
     seconds: float = _SECONDS,
 ) -> dict[str, float]:
-    """Batch size → median time of a call over its grasps; the first call is left out.
+    """Median time of a call over its grasps, for several batch sizes; the first call is left out.
 
     Parameters
     ----------
     predict
         Clouds and masks to quality, as one batch.
-    cloud, mask
-        Grasps to predict; repeated where a batch is larger.
+    cloud
+        Grasps to predict, shape (n, h, w, 3); repeated where a batch is larger.
+    mask
+        Their measured cells, shape (n, h, w).
+    batches
+        Batch sizes.
     seconds
-        So long, and at least three times, each batch size is called.
+        Each batch size is called for this long [s], and at least three times.
+
+    Returns
+    -------
+    Batch size, as text → milliseconds a grasp.
     """
     figures = {}
     for size in batches:
@@ -60,20 +68,28 @@ def runtimes_ms_a_grasp(
     batches: Sequence[int] = BATCHES,
     seconds: float = _SECONDS,
 ) -> dict[str, dict[str, float]]:
-    """Runtime to batch size to milliseconds a grasp on the CPU, one prediction a grasp.
+    """Milliseconds a grasp on the CPU of PyTorch and of OpenVINO, one prediction a grasp.
 
     Parameters
     ----------
     network
-        As it was trained; runs on ``threads`` threads of PyTorch.
+        The trained network; runs on ``threads`` threads of PyTorch.
     exported
         The same network for OpenVINO, on the threads that it was opened with.
-    cloud, mask
-        Grasps to predict; repeated where a batch is larger.
+    cloud
+        Grasps to predict, shape (n, h, w, 3); repeated where a batch is larger.
+    mask
+        Their measured cells, shape (n, h, w).
     threads
         Threads of PyTorch.
-    batches, seconds
-        See `milliseconds_a_grasp`.
+    batches
+        Batch sizes.
+    seconds
+        Each batch size is called for this long [s], and at least three times.
+
+    Returns
+    -------
+    Runtime → batch size, as text → milliseconds a grasp.
     """
 
     def trained(

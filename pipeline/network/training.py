@@ -1,11 +1,11 @@
 """Training GA-CNN: one loop to read from top to bottom; Supplement IV.
 
-The figure of merit is the mean |q̂ − q| of Supplement IV, so the loss is that absolute error, made
-square within ``loss_beta`` of the truth (smooth L1): the median it aims at is what minimises the
-figure, and the rounded corner keeps the last steps from jumping about zero error.
+The figure of merit is the mean |q̂ − q| of Supplement IV. The loss is that absolute error, squared
+within ``loss_beta`` of the truth (smooth L1): its minimum is the median, which also minimises the
+figure of merit, and the squared part makes the last steps small where the error is near zero.
 
 Everything drawn at random follows from (seed, epoch): the order of the samples and the symmetries
-applied to them. A run killed at any batch goes on from the last state saved before it, and arrives
+applied to them. A run killed at any batch resumes from the last state saved before it, and arrives
 at the same bytes as a run never killed. Several processes (``parallel``) take the steps that one
 takes, up to rounding.
 """
@@ -57,7 +57,7 @@ Batch = tuple[Float[Tensor, "b c h w"], Float[Tensor, " b"]]
 
 @dataclass(frozen=True)
 class TrainedNetwork:
-    """What a training leaves.
+    """Result of a training.
 
     Attributes
     ----------
@@ -70,10 +70,12 @@ class TrainedNetwork:
     history
         Every epoch, those before an interruption too.
     stopped_early
-        Patience ran out before the last epoch.
-    waiting_share, preparing_share
-        Shares of this call's steps that were spent waiting for samples to be read, and making
-        canonical inputs of them; None where no step was left to take.
+        Whether patience ran out before the last epoch.
+    waiting_share
+        Share of this call's time spent waiting for samples to be read; None where no step was
+        taken.
+    preparing_share
+        Share of this call's time spent making canonical inputs; None where no step was taken.
     """
 
     network: GaCnn
@@ -102,19 +104,33 @@ def train(
 
     Parameters
     ----------
+    config
+        Epochs, batches, learning rate and device.
+    network
+        Depth, channels and attention.
+    seed
+        Seed of the weights, the order of samples and their symmetries.
+    train_set
+        Samples to train on.
+    val_set
+        Samples that the best epoch is chosen by.
     state_dir
-        Where the resume state lives, seen by all processes. A state of other arguments there is
+        Folder of the resume state, seen by all processes. A state of other arguments there is
         overwritten.
     on_epoch
-        Called by the first process after each epoch of this call, when its state is safe.
+        Called by the first process after each epoch of this call, when its state is saved.
     ranks
         This process's place among those that train together; all call this alike.
     loader_workers
-        Processes that read batches ahead; 0 reads them in between.
+        Processes that read batches ahead; 0: this process reads each batch when it is needed.
     save_every_s
-        Within an epoch the state is saved when so much time has passed.
+        Time between two saved states within an epoch [s].
     show_progress
-        a bar an epoch.
+        Whether to show a progress bar for each epoch.
+
+    Returns
+    -------
+    The network of the best epoch, with its history.
 
     Raises
     ------
@@ -216,12 +232,21 @@ def train(
 def ready_batches(
     loaded: Iterable[RawBatch], symmetry: Int[np.ndarray, " n"] | None, device: torch.device
 ) -> Iterator[Batch]:
-    """Canonical inputs and qualities on the device, batch by batch.
+    """Make canonical inputs of loaded batches, on the device.
 
     Parameters
     ----------
+    loaded
+        Indices, clouds, masks and qualities, batch by batch.
     symmetry
-        For each sample of the set the element that turns or mirrors it.
+        For each sample of the set the element that turns or mirrors it, shape (n,); None: none.
+    device
+        Where the results lie.
+
+    Yields
+    ------
+    Batch
+        Canonical inputs, shape (b, c, h, w), and qualities, shape (b,).
     """
     for indices, cloud, mask, quality in loaded:
         inputs = network_input(
@@ -233,7 +258,7 @@ def ready_batches(
 
 
 def learning_rate_at(step: int, total_steps: int, config: TrainConfig) -> float:
-    """Linear rise over the warm-up, then half a cosine down towards zero; both leave out zero."""
+    """Learning rate of a step: a linear rise over the warm-up, then half a cosine; never zero."""
     warmup = round(config.warmup_fraction * total_steps)
     if step < warmup:
         return config.learning_rate * (step + 1) / warmup
@@ -242,7 +267,7 @@ def learning_rate_at(step: int, total_steps: int, config: TrainConfig) -> float:
 
 
 def build_optimizer(model: GaCnn, config: TrainConfig) -> torch.optim.AdamW:
-    """AdamW that decays the weights of convolutions and fully connected layers alone."""
+    """AdamW with weight decay on the weights of convolutions and fully connected layers alone."""
     parameters = list(model.parameters())
     groups = [
         {"params": [p for p in parameters if p.ndim > 1], "weight_decay": config.weight_decay},
@@ -254,10 +279,21 @@ def build_optimizer(model: GaCnn, config: TrainConfig) -> torch.optim.AdamW:
 def chosen_device(wanted: str, ranks: Ranks) -> torch.device:
     """The device to train on: the GPU of this process's number, or the CPU.
 
+    Parameters
+    ----------
+    wanted
+        ``auto``, ``cpu`` or ``cuda``; ``auto`` takes a GPU where there is one.
+    ranks
+        This process's place among those that train together.
+
+    Returns
+    -------
+    The device.
+
     Raises
     ------
     MachineError
-        a GPU is asked for by name and there is none.
+        A GPU is asked for by name and there is none.
     """
     available = torch.cuda.is_available()
     if wanted == "cuda" and not available:
@@ -270,13 +306,13 @@ def chosen_device(wanted: str, ranks: Ranks) -> torch.device:
 
 
 def mixed_precision(device: torch.device) -> torch.autocast:
-    """bfloat16 where it pays: on a GPU. Its range is single precision's: no loss scaling."""
+    """Use bfloat16 on a GPU; its exponent is single precision's, so the loss needs no scaling."""
     return torch.autocast(device.type, dtype=torch.bfloat16, enabled=device.type == "cuda")
 
 
 @contextmanager
 def reproducible(threads: int) -> Iterator[None]:
-    """Fixed thread count and deterministic kernels within; as it was before afterwards."""
+    """Fix thread count and deterministic kernels for the block, and restore both afterwards."""
     threads_before = torch.get_num_threads()
     deterministic_before = torch.are_deterministic_algorithms_enabled()
     os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
