@@ -29,7 +29,7 @@ ifeq (,$(strip $(WORKERS)))
 unexport WORKERS
 endif
 
-.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios review report export predict docs lint fuzz regress clean FORCE
+.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee review report export predict docs lint fuzz regress clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -105,6 +105,11 @@ bench: .venv/.ready  ## speed of labelling, QP, storage and control, to runs/ben
 
 scenarios: .venv/.ready  ## failure modes of Supplement VIII with RUN's network, to runs/<run>/scenarios.md
 	@$(PY) -m stages.scenarios
+
+referee: .venv/.ready  ## label, p and RUN's network against what the referee finds borne, to runs/<run>/referee
+	@$(PY) -m stages.referee prepare
+	@$(MAKE) --no-print-directory grasps RUN=$(RUN)/referee
+	@$(PY) -m stages.referee judge
 
 gallery: .venv/.ready  ## the nine levels on one sheet, to runs/<run>/gallery.png
 	@$(PY) -m stages.gallery

@@ -20,6 +20,7 @@ from typing import Any, Self
 import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
+from pipeline.config.agreement import AgreementConfig
 from pipeline.config.cameras import CamerasConfig
 from pipeline.config.dataset import DatasetConfig
 from pipeline.config.evaluation import EvaluateConfig, RecordingConfig
@@ -71,6 +72,7 @@ class RunConfig(Section):
     train: TrainConfig = TrainConfig()
     sweep: SweepConfig = SweepConfig()
     referee: RefereeConfig = RefereeConfig()
+    agreement: AgreementConfig = AgreementConfig()
     evaluate: EvaluateConfig = EvaluateConfig()
     predict: PredictConfig = PredictConfig()
     recording: RecordingConfig = RecordingConfig()

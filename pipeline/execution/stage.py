@@ -84,8 +84,9 @@ class RunFolder:
 
     @property
     def cache(self) -> Path:
-        """Folder that all runs share; all in it can be made again."""
-        return self.path.parent / ".cache"
+        """Folder that all runs share, all of which can be made again; a run within a run shares it too."""
+        within = (self.path.parent / "run.toml").is_file()
+        return (self.path.parent.parent if within else self.path.parent) / ".cache"
 
     @property
     def config(self) -> Path:

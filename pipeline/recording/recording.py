@@ -47,6 +47,7 @@ TIMELINES = {
     "evaluate": "frame",
     "sweep": "layers",
     "predict": "grasp",
+    "referee": "grasp",
 }
 
 

@@ -189,6 +189,28 @@ def success_by_level(rates: Mapping[str, Mapping[int, Rate]]) -> str:
         return _svg(figure)
 
 
+def load_by_quality(by_tenth: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
+    """What grasps of each tenth of a score bear: median, and quartiles as bars, a panel a score."""
+    with mpl.rc_context(STYLE):
+        figure, panels = _axes(len(by_tenth), 2.6)
+        for axes, (name, rows), colour in zip(panels, by_tenth.items(), PALETTE[4:], strict=False):
+            there = [row for row in rows if row["count"]]
+            low, middle, high = np.array([row["quartiles_n"] for row in there]).T
+            axes.errorbar(
+                [(row["tenth"] + 0.5) / 10 for row in there],
+                middle,
+                yerr=[middle - low, high - middle],
+                fmt="o-",
+                ms=4,
+                capsize=2,
+                color=_rgb(colour),
+            )
+            axes.set(xlabel=f"{name} [1]", xlim=(0, 1))
+            axes.set_ylim(bottom=0)
+        panels[0].set_ylabel("weight borne [N], quartiles")
+        return _svg(figure)
+
+
 def wall_times(seconds: Mapping[str, float]) -> str:
     """Wall time of each stage."""
     with mpl.rc_context(STYLE):

@@ -1,0 +1,23 @@
+"""[agreement]: on what grasps the label is held against the referee."""
+
+from pydantic import Field
+
+from pipeline.config.section import Section
+
+
+class AgreementConfig(Section):
+    """Grasps of `make referee`: scenes of the mesh folder, and of them an even choice."""
+
+    clutters_per_level: int = Field(
+        2, ge=1, description="clutters of test and training objects a level; half of val objects"
+    )
+    labelled: int = Field(9000, ge=1, description="grasps labelled, to choose from")
+    grasps: int = Field(2400, ge=1, description="grasps judged, spread over q and objects")
+    varied: int = Field(
+        200, ge=0, description="of them, judged again with each figure halved and doubled"
+    )
+    shown: int = Field(30, ge=0, le=200, description="grasps in the recording; some 0.3 MB each")
+    loads_n: tuple[float, ...] = Field(
+        (0.5, 1.0, 2.0, 4.0, 8.0), min_length=1, description="weights to be borne, for AUROC [N]"
+    )
+    resamples: int = Field(400, ge=0, description="bootstrap samples over objects, for intervals")
