@@ -1,8 +1,8 @@
 """`make referee`: the label, and what else scores grasps, against what the referee finds borne.
 
-Scenes and labelled grasps are made in a run of their own, ``runs/<run>/referee``; nothing of the
-run is remade. The referee judges an even choice of them: figures in referee.summary.json and .md,
-every grasp in .csv, calibration.svg, and where label and referee disagree most in referee.rrd.
+Scenes and grasps are made in a run of their own, ``runs/<run>/referee``, nothing of the run is.
+There: referee.summary.json, .md, .csv (a line a grasp), calibration.svg, and referee.rrd, which
+shows where label and referee disagree most.
 """
 
 import json
@@ -18,11 +18,12 @@ import typer
 
 from pipeline.artifacts import publish_bytes, read_provenance
 from pipeline.config import RunConfig, load_run_config
-from pipeline.config.scenes import ClutterCounts
+from pipeline.config.judged import judged_config
 from pipeline.config.written import as_toml
 from pipeline.execution import RunFolder, generator, progress, run_command, run_in_order
 from pipeline.messages.grasp_columns import GraspColumns, read_columns
 from pipeline.messages.scenes import read_placed
+from pipeline.network.analytic import fit_analytic
 from pipeline.recording.recording import recording
 from pipeline.recording.referee import blueprint, show_seals, shown_seal
 from pipeline.referee import judging
@@ -71,13 +72,8 @@ Workers = Annotated[int, typer.Option(envvar="WORKERS", min=1, help="worker proc
 @app.command()
 def prepare(run: RunName = "default", runs_dir: RunsDir = RUNS_DIR) -> None:
     """Write the run.toml of the scenes and grasps that are judged."""
-    config = load_run_config(RunFolder(runs_dir / run).config)
-    some = config.agreement.clutters_per_level
-    counts = ClutterCounts(train=some, val=(some + 1) // 2, test=some)
-    scenes = config.scenes.model_copy(update={"clutters_per_level": counts})
-    grasps = config.grasps.model_copy(update={"count": config.agreement.labelled})
-    text = as_toml(config.model_copy(update={"scenes": scenes, "grasps": grasps}))
-    publish_bytes(RunFolder(runs_dir / run / NAME).config, text.encode())
+    config = judged_config(load_run_config(RunFolder(runs_dir / run).config))
+    publish_bytes(RunFolder(runs_dir / run / NAME).config, as_toml(config).encode())
 
 
 @app.command()
@@ -89,8 +85,7 @@ def judge(run: RunName = "default", workers: Workers = CORES, runs_dir: RunsDir 
     wanted, rng = config.agreement, generator(config.seed, NAME)
     grasps = read_columns(folder.artifact("grasps"))
     names, objects = np.unique(grasps.object_name, return_inverse=True)
-    chosen = judging.chosen_evenly(grasps.quality, objects, wanted.grasps, rng)
-    chosen = chosen[np.argsort(grasps.scene[chosen], kind="stable")]
+    chosen = judging.chosen_evenly(grasps.quality, objects, wanted.grasps, rng)  # scene by scene
     again = judging.chosen_evenly(grasps.quality[chosen], objects[chosen], wanted.varied, rng)
     among = np.isin(np.arange(len(chosen)), again)
     jobs = [
@@ -105,6 +100,7 @@ def judge(run: RunName = "default", workers: Workers = CORES, runs_dir: RunsDir 
     parts = list(progress(done, len(jobs), "referee: judged", "scene"))
     found: Columns = {n: np.concatenate([part[0][n] for part in parts]) for n in parts[0][0]}
     scores = {"q": grasps.quality[chosen], "p of Eq. (2)": grasps.pressure[chosen]}
+    scores["label on the measured cloud"] = analytic(grasps, chosen, config)
     scores |= predicted(RunFolder(runs_dir / run), grasps, chosen)
     among_n = {name: np.concatenate([part[1][name] for part in parts]) for name in parts[0][1]}
     figures = {
@@ -114,17 +110,13 @@ def judge(run: RunName = "default", workers: Workers = CORES, runs_dir: RunsDir 
         "wall_time_s": time.perf_counter() - began,
     }
     columns = {"object": names[objects[chosen]], "scene": grasps.scene[chosen], **scores, **found}
-    text = as_markdown(figures)
-    for name, data in {
-        "referee.summary.json": json.dumps(figures, indent=1) + "\n",
-        "referee.csv": as_csv(columns),
-        "referee.md": text,
-        "calibration.svg": load_by_quality(figures["by_tenth"]),
-    }.items():
-        publish_bytes(folder.path / name, data.encode())
+    files = {"summary.json": json.dumps(figures, indent=1) + "\n", "csv": as_csv(columns)}
+    for ending, data in (files | {"md": as_markdown(figures)}).items():
+        publish_bytes(folder.path / f"{NAME}.{ending}", data.encode())
+    publish_bytes(folder.path / "calibration.svg", load_by_quality(figures["by_tenth"]).encode())
     apart = most_apart(scores["q"], found["borne_n"], wanted.shown)
     show(folder, config, grasps, chosen[apart], {n: column[apart] for n, column in columns.items()})
-    sys.stdout.write(text)
+    sys.stdout.write(as_markdown(figures))
 
 
 def predicted(run: RunFolder, grasps: GraspColumns, rows: np.ndarray) -> Columns:
@@ -132,11 +124,18 @@ def predicted(run: RunFolder, grasps: GraspColumns, rows: np.ndarray) -> Columns
     if not run.artifact("train").is_file():
         return {}
     score = network(run.artifact("train")).predict(grasps.cloud[rows], grasps.cloud_mask[rows])
-    trained = [
-        n for n, (_, split) in catalogue(run.artifact("objects")).items() if split == "train"
-    ]
-    unseen = ~np.isin(grasps.object_name[rows], trained)
+    objects = catalogue(run.artifact("objects"))
+    unseen = np.array([objects.get(n, (0, ""))[1] != "train" for n in grasps.object_name[rows]])
     return {"q-hat": score, "q-hat, unseen objects": np.where(unseen, score, np.nan)}
+
+
+def analytic(grasps: GraspColumns, rows: np.ndarray, config: RunConfig) -> np.ndarray:
+    """The analytic baseline, fitted to grasps that are not judged."""
+    others = np.setdiff1d(np.arange(len(grasps.quality)), rows)
+    fit = generator(config.seed, NAME, "fit").permutation(others)[: config.agreement.fitted]
+    cloud, mask = grasps.cloud, grasps.cloud_mask
+    found = fit_analytic(cloud[fit], mask[fit], grasps.quality[fit], config.gripper)
+    return found.predict(cloud[rows], mask[rows])
 
 
 def scene_of(job: SceneJob) -> tuple[judging.Placed, tuple[PlacedObject, ...], np.ndarray]:

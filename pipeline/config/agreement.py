@@ -16,6 +16,9 @@ class AgreementConfig(Section):
     varied: int = Field(
         200, ge=0, description="of them, judged again with each figure halved and doubled"
     )
+    fitted: int = Field(
+        600, ge=10, description="other grasps that the label on measured clouds is fitted to"
+    )
     shown: int = Field(30, ge=0, le=200, description="grasps in the recording; some 0.3 MB each")
     loads_n: tuple[float, ...] = Field(
         (0.5, 1.0, 2.0, 4.0, 8.0), min_length=1, description="weights to be borne, for AUROC [N]"

@@ -20,7 +20,12 @@ def _table(lines: list[str], name: str, section: Section) -> None:
     tables = {key: value for key, value in values.items() if isinstance(value, Section)}
     if name:
         lines += ["", f"[{name}]"]
-    lines += [f"{key} = {_value(value)}" for key, value in values.items() if key not in tables]
+    # TOML has no word for nothing: what is None is left out, as it is None unless named.
+    lines += [
+        f"{key} = {_value(value)}"
+        for key, value in values.items()
+        if key not in tables and value is not None
+    ]
     for key, table in tables.items():
         _table(lines, f"{name}.{key}" if name else key, table)
 

@@ -22,7 +22,7 @@ def made(run: RunFolder, tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
     shutil.copytree(run.path, runs / "tiny")
     config = load_run_config(run.config)
     few = config.agreement.model_copy(
-        update={"grasps": 40, "varied": 2, "shown": 4, "resamples": 20}
+        update={"grasps": 40, "varied": 2, "shown": 4, "resamples": 20, "fitted": 60}
     )
     (runs / "tiny" / "run.toml").write_text(as_toml(config.model_copy(update={"agreement": few})))
     prepare("tiny", runs)
@@ -44,7 +44,10 @@ def test_the_referees_run_has_scenes_of_its_own(made: RunFolder) -> None:
 def test_figures_are_of_every_score(made: RunFolder) -> None:
     figures = json.loads(made.summary("referee").read_text())
     assert figures["grasps"] == 40
-    assert set(figures["scores"]) == {"q", "p of Eq. (2)", "q-hat", "q-hat, unseen objects"}
+    assert set(figures["scores"]) == {
+        *("q", "p of Eq. (2)", "label on the measured cloud"),
+        *("q-hat", "q-hat, unseen objects"),
+    }
     assert figures["spearman"] == figures["scores"]["q"]["spearman"]
     assert set(figures["auroc"]) == {"0.5", "1", "2", "4", "8"}
     assert figures["varied"]["as configured"]["grasps"] == 2
