@@ -62,7 +62,7 @@ TRAIN = Stage(
 )
 EVALUATE = Stage(
     "evaluate",
-    ("seed", "evaluate", "scenes", "cameras", "gripper", "sensing"),
+    ("seed", "evaluate", "referee", "scenes", "cameras", "gripper", "sensing"),
     ("objects", "scenes", "train"),
     shown=("recording.attempts",),
     drawn_apart=True,

@@ -12,12 +12,17 @@ PolicyName = Literal["closed-loop", "uncorrected", "open-loop", "geometric"]
 
 
 class SuctionConfig(Section):
-    """The vacuum and the joint that carries an object."""
+    """The vacuum and the joint that carries an object, for `judge = "label"`."""
 
     vacuum_pa: float = Field(
         8000.0, gt=0, le=101_325, description="pressure difference at p = 1 of Eq. (2) [Pa]"
     )
-    seal_min: float = Field(0.05, ge=0, le=1, description="least p that closes the joint [1]")
+    seal_min: float = Field(
+        0.05,
+        ge=0,
+        le=1,
+        description="least p that closes the joint; a seal worse than this counts as none [1]",
+    )
 
 
 class LiftConfig(ScaledSection):
@@ -101,6 +106,11 @@ class EvaluateConfig(Section):
     robot: RobotName = Field("floating", description="a gripper alone, or on a KUKA LBR iiwa 14")
     segmentation: Literal["none", "ideal"] = Field(
         "none", description="what tells objects apart by colour; 'ideal': the truth, pixel by pixel"
+    )
+    judge: Literal["referee", "label"] = Field(
+        "referee",
+        description="what an object hangs by: what [referee] finds borne, or the label's p and "
+        "Eq. (7)-(11) at suction.vacuum_pa",
     )
     policies: tuple[PolicyName, ...] = Field(
         ("closed-loop", "open-loop", "geometric"), min_length=1, description="the first is judged"

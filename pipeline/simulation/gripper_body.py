@@ -20,7 +20,7 @@ from pipeline.labelling.heights import pad_heights
 from pipeline.labelling.poses import label_poses
 from pipeline.physics.engine import Body
 from pipeline.simulation.floating import Mover
-from pipeline.simulation.suction import Holding, holding
+from pipeline.simulation.judges import judge_of
 from pipeline.simulation.suction_joint import SuctionJoint
 from pipeline.world.posed_bodies import PosedBodies, PosedScene
 
@@ -85,6 +85,7 @@ class SuctionGripper:
         self._pad = pad
         self._config = config
         self._mover = mover
+        self._judge = judge_of(config, pad)
         self._surfaces = PosedBodies(
             {i: item.mesh for i, item in objects.items()}, config.scenes.table_side_m
         )
@@ -136,33 +137,23 @@ class SuctionGripper:
         return self._reading(np.mean(loads, axis=0), peak_n, self._at(world_from_gripper), touched)
 
     def vacuum(self, on: bool) -> None:
-        """Off lets go. On seals what is under the pad, on the true surfaces, if p is enough."""
+        """Off lets go. On seals what is under the pad, on the true surfaces, as the judge finds."""
         if not on:
             if self._joint is not None:
                 self._joint.open()
             self._joint = None
             return
         self.reached_pose = pose = self.pose()
-        self.target, self.reached_quality = 0, 0.0
-        heights, below = pad_heights(pose[None], self.surfaces(), self._pad, self._reach_m())
-        best = Holding(0.0, 0.0, 0.0, 0.0, 0.0)
-        for body_id in (int(i) for i in np.unique(below[below > 0])):
-            on_target = below == body_id
-            found = holding(
-                self._pad,
-                heights[0],
-                on_target[0],
-                self._config.gripper,
-                self._config.evaluate.suction,
-            )
-            if found.pressure > best.pressure:
-                best, self.target = found, body_id
-        if self.target:
-            self.reached_quality = self._quality_at(pose, self.target)
-        self.seal_pressure = best.pressure
-        if self.target and best.pressure >= self._config.evaluate.suction.seal_min:
+        self.target, self.reached_quality, self.seal_pressure = 0, 0.0, 0.0
+        found = self._judge.sealed(pose, self.surfaces())
+        if found is None or found[1].pressure <= 0.0:
+            return
+        self.target, bearing = found
+        self.seal_pressure = bearing.pressure
+        self.reached_quality = self._quality_at(pose, self.target)
+        if bearing.closes:
             body, item = self._bodies[self.target], self._objects[self.target]
-            self._joint = SuctionJoint.closed(body, item, best, pose)
+            self._joint = SuctionJoint.closed(body, item, bearing, pose)
 
     def shake(self) -> Reading:
         """Side to side, then still; the wrench is the mean while still."""

@@ -1,4 +1,4 @@
-"""What a sealed pad can hold, in newtons: Eq. (7)-(11) at a named vacuum.
+"""What a sealed pad can hold as the label has it, in newtons: Eq. (7)-(11) at a named vacuum.
 
 Eq. (7) gives the vacuum force, Eq. (8)-(11) what friction bears along and about the surface.
 The supplement ignores moments about x and y (A-3); a lifted object has weight, so they are
@@ -21,13 +21,35 @@ from pipeline.gripper.wrench import vacuum_force
 
 @dataclass(frozen=True)
 class Holding:
-    """Limits of a seal: pull and side forces [N], torsion and peel moments [N m], p of Eq. (2)."""
+    """Limits of a seal: pull and side forces [N], torsion and peel moments [N m], p of Eq. (2).
+
+    seal_min : least p that bears anything.
+    """
 
     pressure: float
     pull_n: float
     side_n: float
     torsion_nm: float
     peel_nm: float
+    seal_min: float = 0.0
+
+    @property
+    def closes(self) -> bool:
+        """Whether p is enough to close the joint."""
+        return self.pressure > 0.0 and self.pressure >= self.seal_min
+
+    def bears(self, load: Float[np.ndarray, " 6"]) -> bool:
+        """Whether a load is within every limit.
+
+        load : force [N] and moment [N m] that the object exerts on the pad, in GCS; a pull
+        away from the pad is along -z.
+        """
+        return (
+            max(-float(load[2]), 0.0) <= self.pull_n
+            and bool(np.abs(load[:2]).max() <= self.side_n)
+            and abs(float(load[5])) <= self.torsion_nm
+            and float(np.hypot(load[3], load[4])) <= self.peel_nm
+        )
 
 
 def holding(
@@ -41,7 +63,7 @@ def holding(
     draped = drape(pad, heights_m[None])[0]
     contact = contact_of(pad, draped, contact_vertices(pad, draped, heights_m, on_target))
     if not contact.triangles.size:
-        return Holding(0.0, 0.0, 0.0, 0.0, 0.0)
+        return Holding(0.0, 0.0, 0.0, 0.0, 0.0, suction.seal_min)
     force_n = suction.vacuum_pa * pad.area_m2 * vacuum_force(pad, contact)  # Eq. (7)
     side_n = math.sqrt(3) / 3 * gripper.friction * force_n  # Eq. (8), (9)
     return Holding(
@@ -50,28 +72,5 @@ def holding(
         side_n=side_n,
         torsion_nm=side_n * pad.radius_m,  # Eq. (11)
         peel_nm=force_n * gripper.pad.seal_radius_m,
-    )
-
-
-def breaks(limits: Holding, load: Float[np.ndarray, " 6"]) -> bool:
-    """Whether a load is more than the seal holds.
-
-    Parameters
-    ----------
-    limits
-        What the seal bears.
-    load
-        Force [N] and moment [N m] that the object exerts on the pad, in GCS; a pull away from
-        the pad is along -z.
-
-    Returns
-    -------
-    True where the seal breaks.
-    """
-    pull = max(-float(load[2]), 0.0)
-    return (
-        pull > limits.pull_n
-        or bool(np.abs(load[:2]).max() > limits.side_n)
-        or abs(float(load[5])) > limits.torsion_nm
-        or float(np.hypot(load[3], load[4])) > limits.peel_nm
+        seal_min=suction.seal_min,
     )

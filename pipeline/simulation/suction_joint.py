@@ -13,7 +13,7 @@ from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.compiled_poses import pose_of, turn_between
 from pipeline.geometry.transforms import invert
 from pipeline.physics.engine import Body, roll_freely
-from pipeline.simulation.suction import Holding, breaks
+from pipeline.simulation.judges import Bearing
 
 _RATE_1_S = 40.0  # natural frequency; critically damped
 _GRAVITY = np.array([0.0, 0.0, -9.81])  # standard gravity to three digits
@@ -25,7 +25,7 @@ class SuctionJoint:
 
     body: Body
     item: CatalogueObject
-    limits: Holding
+    limits: Bearing
     gripper_from_object: Float[np.ndarray, "4 4"]
     rises_from_m: float
 
@@ -34,7 +34,7 @@ class SuctionJoint:
         cls,
         body: Body,
         item: CatalogueObject,
-        limits: Holding,
+        limits: Bearing,
         world_from_gripper: Float[np.ndarray, "4 4"],
     ) -> "SuctionJoint":
         """The joint as it closes: the object stays where it is against the pad."""
@@ -67,7 +67,7 @@ class SuctionJoint:
         load = -np.concatenate(
             [into_gripper @ force, into_gripper @ (torque + np.cross(arm, force))]
         )
-        if breaks(self.limits, load):
+        if not self.limits.bears(load):
             return load, False
         self.body.rigid.add_force_torque(force, torque)
         return load, True

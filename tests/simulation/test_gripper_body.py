@@ -43,7 +43,7 @@ def gripper_over(
     robot: RobotName = "floating",
 ) -> SuctionGripper:
     suction = SuctionConfig(vacuum_pa=vacuum_pa)
-    config = RunConfig(evaluate=EvaluateConfig(suction=suction, robot=robot))
+    config = RunConfig(evaluate=EvaluateConfig(suction=suction, robot=robot, judge="label"))
     item = catalogue_object("it", shape, cache, density_kg_m3)
     world = new_world(config.scenes, render=False)
     lowest = float(item.mesh.vertices_m[:, 2].min())
