@@ -64,7 +64,7 @@ class Recorded:
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 RunName = Annotated[str, typer.Option(envvar="RUN", help="name of the run")]
-CORES = len(os.sched_getaffinity(0))
+CORES = len(os.sched_getaffinity(0))  # a worker each, as in stages
 RunsDir = Annotated[Path, typer.Option(help="folder of all runs")]
 Workers = Annotated[int, typer.Option(envvar="WORKERS", min=1, help="worker processes")]
 

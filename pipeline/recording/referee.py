@@ -23,7 +23,7 @@ from pipeline.referee.seal import GRAVITY_M_S2, Seal
 
 TIMELINE = "grasp"
 LIFT_M = 3e-4  # the pad is drawn so far above what it lies on, as that is drawn simplified
-ARROW_M_PER_N = 0.003
+ARROW_M_PER_N = 0.003  # a closed fan on the whole pad, some 24 N, is drawn as long as the view
 NEAR_M = 0.15  # other objects are shown when their centres are this near
 VIEW = "Pad by the vacuum under it (dark 0, yellow a closed fan's), load borne and weight; in GCS"
 

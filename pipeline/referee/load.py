@@ -17,7 +17,8 @@ from pipeline.referee.disc import Disc
 
 FRICTION_SIDES = 12  # of the pyramid in Coulomb's cone: 3.4 % less at most
 BALANCED = 1e-6  # of the largest force in play
-INFEASIBLE, UNBOUNDED = 2, 3  # what linprog says
+OPTIMAL, INFEASIBLE, UNBOUNDED = 0, 2, 3  # what linprog says
+MOST, HALVINGS = 1e6, 40  # a scale over this is without end; a millionth of a millionth of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +76,23 @@ class Hold:
         found = linprog(cost, A_eq=columns, b_eq=self._scaled(-self.suction), method="highs")
         if found.status == INFEASIBLE:
             return 0.0
-        return np.inf if found.status == UNBOUNDED else float(found.x[-1])
+        if found.status == UNBOUNDED:
+            return np.inf
+        return float(found.x[-1]) if found.status == OPTIMAL else self._scale_by_halving(load)
+
+    def _scale_by_halving(self, load: Float[np.ndarray, " 6"]) -> float:
+        """The same by checking loads, where the linear program meets numerical difficulties."""
+        if not self.bears(np.zeros(6)):
+            return 0.0
+        low, high = 0.0, 1.0
+        while self.bears(high * load):
+            low, high = high, 2.0 * high
+            if high > MOST:
+                return np.inf
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if self.bears(middle * load) else (low, middle)
+        return low
 
     def _scaled(self, wrenches: Float[np.ndarray, "6 *more"]) -> Float[np.ndarray, "6 *more"]:
         """With moments over r_G."""

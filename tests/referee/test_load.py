@@ -110,6 +110,14 @@ def curved_hold() -> Hold:
     )
 
 
+@pytest.mark.parametrize("hold", [flat_hold(), curved_hold()])
+def test_where_the_linear_program_gives_up_halving_finds_the_same(hold: Hold) -> None:
+    for load in (np.array([0.3, 0, -1, 0.01, 0, 0.002]), np.array([0, 0, -1.0, 0, 0.02, 0])):
+        found = hold._scale_by_halving(load)
+        assert found == pytest.approx(hold.largest_scale(load), rel=1e-4)
+    assert hold._scale_by_halving(np.array([0, 0, 1.0, 0, 0, 0])) == np.inf
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_pyramids_bear_a_little_less_than_cones(seed: int) -> None:
     """Clarabel with Coulomb's own cones bears as much, to the pyramids' 3.4 %."""
