@@ -84,7 +84,7 @@ class RunFolder:
 
     @property
     def cache(self) -> Path:
-        """Folder that all runs share, all of which can be made again; a run within a run shares it too."""
+        """Folder that all runs share, a run within a run too; all in it can be made again."""
         within = (self.path.parent / "run.toml").is_file()
         return (self.path.parent.parent if within else self.path.parent) / ".cache"
 
