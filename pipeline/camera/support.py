@@ -94,6 +94,10 @@ def find_support(
         if plane.share >= config.support_share and plane.normal @ up >= np.cos(off_rad)
     ]
     distance_m = np.linalg.norm(points_m - eyes_m, axis=1)
+    # A floor under clutter shows little of itself, but the tops of boxes on it are parallel to it.
+    level += [
+        shifted for plane in level for shifted in _parallel(plane, points_m, distance_m, config)
+    ]
     below = [
         float(np.mean(plane.height_m(points_m) < -2 * config.tolerance * distance_m))
         for plane in level
@@ -192,6 +196,24 @@ def _from_edge(
             normal = -normal
         nearest = np.minimum(nearest, (points_m - corner) @ normal)
     return nearest
+
+
+def _parallel(
+    plane: Plane,
+    points_m: Float[np.ndarray, "n 3"],
+    distance_m: Float[np.ndarray, " n"],
+    config: SupportConfig,
+) -> list[Plane]:
+    """Planes parallel to one, at lower heights at which many points lie."""
+    height_m = plane.height_m(points_m)
+    near_m = config.tolerance * float(np.median(distance_m))
+    lowest = float(np.percentile(height_m, 100 * config.below_max_share / 2))
+    found = []
+    for offset_m in np.arange(lowest, -near_m, near_m):
+        share = float(np.mean(np.abs(height_m - offset_m) <= near_m))
+        if share >= config.support_share:
+            found.append(Plane(plane.normal, plane.offset_m + float(offset_m), share))
+    return found
 
 
 def _looked_at(

@@ -50,6 +50,15 @@ class StaticCameraConfig(DepthCameraConfig):
     )
 
     @model_validator(mode="after")
+    def _table_is_in_range(self) -> Self:
+        if not self.near_m < self.distance_m < self.far_m:
+            raise ValueError(
+                f"distance_rg puts the camera at {self.distance_m:g} m, and it measures from "
+                f"near_m = {self.near_m:g} to far_m = {self.far_m:g}"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _viewpoints_pair_up(self) -> Self:
         if len(self.elevations_rad) != len(self.azimuths_rad):
             raise ValueError("elevations_rad and azimuths_rad need the same length")
@@ -77,6 +86,15 @@ class WristCameraConfig(DepthCameraConfig):
     elevation_max_rad: float = Field(
         1.5, gt=0, le=math.pi / 2, description="steepest look at an object [rad]"
     )
+
+    @model_validator(mode="after")
+    def _object_is_in_range(self) -> Self:
+        if not self.near_m < self.distance_m < self.far_m:
+            raise ValueError(
+                f"distance_rg puts the camera at {self.distance_m:g} m, and it measures from "
+                f"near_m = {self.near_m:g} to far_m = {self.far_m:g}"
+            )
+        return self
 
     @model_validator(mode="after")
     def _elevations_are_ordered(self) -> Self:

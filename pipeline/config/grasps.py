@@ -9,6 +9,8 @@ from pipeline.config.section import LengthInMetres, ScaledSection, Section
 
 CELL_SIDE = 0.1  # side of a sub cloud's cell in units of r_G: 60 mm in 24 cells over 25 mm
 
+SMALLEST_PAD_M, LARGEST_PAD_M = 0.002, 1.0  # r_G of suction pads, from a needle's to a table's
+
 SolverName = Literal["structured", "piqp-sparse", "piqp-dense", "clarabel"]
 
 
@@ -27,7 +29,13 @@ class PadConfig(Section):
         return self.radius_m
 
     seal_radius_rg: float = Field(0.8, gt=0, description="r_v, radius of Reg.V; Table I [r_G]")
-    radius_m: float = Field(0.025, gt=0, description="r_G, radius of the pad; Table I [m]")
+    radius_m: float = Field(
+        0.025,
+        ge=SMALLEST_PAD_M,
+        le=LARGEST_PAD_M,
+        strict=True,
+        description="r_G, radius of the pad; Table I [m]",
+    )
     altitude_rg: float = Field(1.2, gt=0, description="H, altitude of the pad; Table I [r_G]")
     rotation_step_rad: float = Field(
         0.045 * math.pi, gt=0, le=math.pi / 2, description="Delta_theta; Table I [rad]"

@@ -71,6 +71,8 @@ class ObjectsConfig(ScaledSection):
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
+        if self.min_extent_m > self.max_extent_m:
+            raise ValueError("min_extent_m must not exceed max_extent_m")
         if self.target_extent_min_rg > self.target_extent_max_rg:
             raise ValueError("target_extent_min_rg must not exceed target_extent_max_rg")
         return self

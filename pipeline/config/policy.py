@@ -1,9 +1,9 @@
 """[evaluate.policy]: candidates, the closed loop, and the geometric picker; Supplement VI."""
 
 import math
-from typing import ClassVar
+from typing import ClassVar, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from pipeline.config.section import LengthInMetres, ScaledSection
 
@@ -15,6 +15,13 @@ class MotionConfig(ScaledSection):
     still_m: ClassVar[LengthInMetres] = LengthInMetres()
 
     cell_rg: float = Field(0.08, gt=0, description="cell of the height maps compared [r_G]")
+
+    @model_validator(mode="after")
+    def _refreshes_within_reach(self) -> Self:
+        if self.refresh_cells > self.reach_cells:
+            raise ValueError("refresh_cells must not exceed reach_cells: no shift is that long")
+        return self
+
     reach_cells: int = Field(20, ge=1, le=200, description="longest shift that is looked for")
     refresh_cells: int = Field(
         12, ge=1, le=200, description="shift after which the earlier picture is replaced"
@@ -236,5 +243,12 @@ class PolicyConfig(ScaledSection):
     )
     trim_moment_nm: float = Field(0.005, ge=0, description="less is not worth a tilt [N m]")
     motion: MotionConfig = MotionConfig()
+
+    @model_validator(mode="after")
+    def _approach_has_a_way(self) -> Self:
+        if self.commit_rg >= self.standoff_rg:
+            raise ValueError("commit_rg must be less than standoff_rg, or nothing is corrected")
+        return self
+
     unseen: UnseenConfig = UnseenConfig()
     picker: PickerConfig = PickerConfig()

@@ -24,7 +24,15 @@ from pipeline.config.agreement import AgreementConfig
 from pipeline.config.cameras import CamerasConfig
 from pipeline.config.dataset import DatasetConfig
 from pipeline.config.evaluation import EvaluateConfig, RecordingConfig
-from pipeline.config.grasps import CELL_SIDE, GraspsConfig, GripperConfig, PadConfig, SensingConfig
+from pipeline.config.grasps import (
+    CELL_SIDE,
+    LARGEST_PAD_M,
+    SMALLEST_PAD_M,
+    GraspsConfig,
+    GripperConfig,
+    PadConfig,
+    SensingConfig,
+)
 from pipeline.config.learning import NetworkConfig, ShardsConfig, SweepConfig, TrainConfig
 from pipeline.config.objects import ObjectsConfig, SplitConfig
 from pipeline.config.predict import PredictConfig
@@ -123,7 +131,8 @@ def _pad_radius_m(values: Any) -> float | None:
             values = values.get(name, PadConfig().radius_m if name == "radius_m" else {})
         else:
             return None
-    return float(values) if isinstance(values, int | float) and values > 0 else None
+    fits = isinstance(values, int | float) and SMALLEST_PAD_M <= values <= LARGEST_PAD_M
+    return float(values) if fits else None
 
 
 def load_run_config(path: Path) -> RunConfig:

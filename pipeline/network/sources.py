@@ -17,7 +17,7 @@ from pipeline.network.control_inference import ControlPredictor
 
 RELEASED, ANALYTIC = "released", "analytic"
 RELEASED_FOLDER = Path(__file__).parent / "released"
-EXPORT_FILE, BASELINE_FILE = "ga_cnn.onnx", "analytic.json"
+EXPORT_FILE, BASELINE_FILE, DIGESTS_FILE = "ga_cnn.onnx", "analytic.json", "digests.json"
 
 Predict = Callable[
     [Float[np.ndarray, "n g g 3"], Bool[np.ndarray, "n g g"]], Float[np.ndarray, " n"]
@@ -76,6 +76,17 @@ def quality_source(named: str, gripper: GripperConfig, threads: int) -> QualityS
         raise ArtifactError(f"{path}: {error.what}", error.remedy) from error
     name = "the released network" if named == RELEASED else path.name
     return QualitySource(name, predictor.predict, hashlib.sha256(data).hexdigest())
+
+
+def released_digests() -> dict[str, str]:
+    """SHA-256 of each released file by its name, as the release wrote them down."""
+    digests: dict[str, str] = json.loads((RELEASED_FOLDER / DIGESTS_FILE).read_text())
+    return digests
+
+
+def sha256_of(path: Path) -> str:
+    """SHA-256 of a file's content, as hexadecimal digits."""
+    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def baseline_to_json(baseline: AnalyticBaseline) -> str:
