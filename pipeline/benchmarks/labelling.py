@@ -88,8 +88,10 @@ def phases(
 
     Parameters
     ----------
-    pad, config
-        The gripper, and the run.
+    pad
+        The pad in GCS.
+    config
+        The run.
     view
         The picture that sub clouds are cut from.
     surfaces
@@ -98,6 +100,10 @@ def phases(
         What is labelled, phase by phase.
     written
         Kept grasps, for the time of writing.
+
+    Returns
+    -------
+    Figures by their names in bench.json.
     """
     frames, body = candidates.world_from_contact, candidates.body_id
     clearance_m = config.grasps.clearance_m
@@ -140,8 +146,10 @@ def phase_seconds(
 
     Parameters
     ----------
-    pad, config
-        The gripper.
+    pad
+        The pad in GCS.
+    config
+        Contact physics and the QP.
     rays
         The true surfaces.
     world_from_contact
@@ -150,6 +158,10 @@ def phase_seconds(
         Each grasp's own body, as ``rays`` numbers it, shape (n,).
     clearance_m
         Height of the rays' origins above the contact [m].
+
+    Returns
+    -------
+    Phase → seconds for all grasps.
     """
     laps = Laps()
     lower, upper = wrench_limit_ratios(config.friction)

@@ -42,8 +42,10 @@ def problems_under(
 
     Parameters
     ----------
-    pad, config
-        The gripper.
+    pad
+        The pad in GCS.
+    config
+        Contact physics and the QP.
     surfaces
         The scene's true surfaces.
     candidates

@@ -45,6 +45,10 @@ def one_body(label: str, shells: list[Mesh], done: list[str]) -> Mesh:
     done
         What was done to the mesh so far; it is added to.
 
+    Returns
+    -------
+    The closed mesh.
+
     Raises
     ------
     MeshError

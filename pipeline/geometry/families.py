@@ -41,6 +41,15 @@ class Families:
 def read_declared(path: Path) -> tuple[DeclaredFamily, ...]:
     """The families of a families.toml: ``"toy bricks" = ["073-*", "brick"]``, a line each.
 
+    Parameters
+    ----------
+    path
+        The file.
+
+    Returns
+    -------
+    What it declares, in its order.
+
     Raises
     ------
     ConfigError
@@ -78,6 +87,10 @@ def group(
         Two shapes nearer than this are near-copies [1].
     fixed
         Splits that are settled already, by object.
+
+    Returns
+    -------
+    Family of each object, and what had to be left out.
 
     Raises
     ------

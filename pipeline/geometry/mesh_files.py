@@ -56,6 +56,10 @@ def load_mesh_file(path: Path, folder: Path, name: str, config: ObjectsConfig) -
     config
         Bounds on file, faces and size, and the unit where no file declares one.
 
+    Returns
+    -------
+    The surface, its unit, and what was done to read it.
+
     Raises
     ------
     MeshError

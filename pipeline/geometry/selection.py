@@ -47,6 +47,10 @@ def choose_split(
     ----------
     classes
         Class of each object to be split.
+    config
+        Fractions of the splits.
+    seed
+        Of the draw.
     family_of
         Family of each object, also of those that only `fixed` names.
     fixed

@@ -37,6 +37,17 @@ class Settled:
 def read_settled(path: Path, basis: str) -> Settled:
     """What is settled already; nothing where there is no such file or it rests on other grounds.
 
+    Parameters
+    ----------
+    path
+        A file in the run's state.
+    basis
+        Digest of what settled splits rest on: with another one they are drawn anew.
+
+    Returns
+    -------
+    What is settled.
+
     Raises
     ------
     ConfigError

@@ -27,6 +27,10 @@ def split_objects(
         Names of those that are for training alone.
     declared
         Families that a person declared.
+    config
+        Fractions of the splits, and how alike a family is.
+    seed
+        Of the draw.
     settled
         Splits by content from an earlier making of the run.
 

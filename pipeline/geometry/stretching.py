@@ -24,8 +24,14 @@ def stretched_copies(
         The objects to stretch.
     taken
         Names that no copy may have.
+    config
+        How many copies, and how far they are stretched.
     rng_of
         The random stream of one copy, by its object's content and its number.
+
+    Returns
+    -------
+    The copies, in the order of their objects.
 
     Raises
     ------

@@ -32,6 +32,10 @@ def load_mesh(path: Path | str, config: ObjectsConfig | None = None) -> Mesh:
         Bounds on its size, and its unit where the file does not declare one; by default the unit
         is found from the size, see `pipeline.geometry.mesh_files.length_unit`.
 
+    Returns
+    -------
+    Vertices in metres and triangles.
+
     Raises
     ------
     MeshError
@@ -94,6 +98,10 @@ def rigid_poses(poses: ArrayLike) -> Float[np.ndarray, "n 4 4"]:
     ----------
     poses
         What is to be (n, 4, 4) homogeneous matrices.
+
+    Returns
+    -------
+    The same poses, shape (n, 4, 4).
 
     Raises
     ------

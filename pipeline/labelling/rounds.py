@@ -59,6 +59,10 @@ def kept_grasps(
         How many to keep.
     rng
         Draws proposals and what is kept.
+
+    Returns
+    -------
+    Contacts, their labels, and the chance that each had to be kept.
     """
     tried = int(np.ceil(wanted * config.grasps.oversampling))
     candidates, labels = label_rounds(surface, surfaces, config, tried, rng)

@@ -36,6 +36,10 @@ def scene_surfaces(
         Surface of each object by its name, in the object's own frame [m].
     table_side_m
         Side of the table, ``scenes.table_side_m`` [m].
+
+    Returns
+    -------
+    Surfaces by body id, the table as 0.
     """
     return surfaces_at_rest(bodies_at_rest(scene.objects, meshes, table_side_m))
 
@@ -107,6 +111,10 @@ def visible_surface(view: CameraView, surfaces: Surfaces, radius_m: float) -> Vi
         The true surfaces; the table is body 0.
     radius_m
         How far around a contact the picture must show the scene, r_G [m].
+
+    Returns
+    -------
+    A point and a normal for each pixel that shows an object.
 
     Raises
     ------

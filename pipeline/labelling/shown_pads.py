@@ -55,6 +55,10 @@ def drape_again(
         The true surfaces of the scene.
     config
         Sections grasps and gripper.
+
+    Returns
+    -------
+    Heights and pressures, in the order of ``chosen``.
     """
     pad, gripper = pad_of(config.gripper.pad), config.gripper
     frames = np.concatenate([grasps.world_from_gripper for grasps in batches])[chosen]

@@ -99,7 +99,8 @@ def recording(stage: Recorded, blueprint: rrb.Blueprint) -> Iterator[rr.Recordin
 
     Yields
     ------
-    The open recording.
+    rr.RecordingStream
+        The open recording.
 
     Raises
     ------

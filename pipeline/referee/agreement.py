@@ -26,6 +26,10 @@ def auroc(score: Float[np.ndarray, " n"], holds: Bool[np.ndarray, " n"]) -> floa
         Shape (n,).
     holds
         Shape (n,).
+
+    Returns
+    -------
+    In [0, 1], or None.
     """
     good = int(holds.sum())
     bad = len(holds) - good
@@ -139,10 +143,16 @@ def varied(
     ----------
     quality
         q, shape (n,).
-    as_configured_n, borne_n
-        What is borne, as configured and by variation, shape (n,) [N].
+    as_configured_n
+        What each grasp bears as configured, shape (n,) [N].
+    borne_n
+        Variation → what each grasp bears with it, shape (n,) [N].
     config
         Loads.
+
+    Returns
+    -------
+    Figures by variation.
     """
     each = {"as configured": as_configured_n, **borne_n}
     every = np.zeros(len(quality), dtype=np.int64)

@@ -39,10 +39,20 @@ def press(
 
     Parameters
     ----------
-    disc, cushion, surface_m, force_n
-        As there.
+    disc
+        The pad's elements.
+    cushion
+        Its stiffness and tension.
+    surface_m
+        s, height of the surface under each vertex, shape (n,), GCS [m].
+    force_n
+        F > 0, with which the pad is pressed along -z [N].
     near
         The same pad pressed with a little less: a start.
+
+    Returns
+    -------
+    The pad at rest on the surface.
 
     Raises
     ------

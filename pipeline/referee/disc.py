@@ -68,6 +68,10 @@ def build_disc(radius_m: float, element_m: float) -> Disc:
         r_G [m].
     element_m
         Largest radial side of an element [m].
+
+    Returns
+    -------
+    Vertices, elements and patches of the disc.
     """
     rings = max(2, int(np.ceil(radius_m / element_m - 1e-9)))
     vertices = _hexagonal_points(rings) * radius_m

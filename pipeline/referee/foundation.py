@@ -67,6 +67,10 @@ def press(
     force_n
         F > 0, with which the pad is pressed along -z [N].
 
+    Returns
+    -------
+    The pad at rest on the surface.
+
     Raises
     ------
     ValueError

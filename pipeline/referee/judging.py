@@ -67,6 +67,10 @@ def placed(
         Side of the table [m].
     clearance_m
         How far above a grasp its rays begin [m].
+
+    Returns
+    -------
+    The scene, ready for rays.
     """
     bodies = [m.transformed(pose) for m, pose in zip(meshes, world_from_objects, strict=True)]
     centres = np.array([pose[:3, 3] for pose in world_from_objects])
@@ -84,14 +88,20 @@ def sealed(
 
     Parameters
     ----------
-    config, radius_m
-        The pad.
+    config
+        Section referee.
+    radius_m
+        r_G [m].
     scene
         Where the bodies are.
     world_from_gripper
         The pad's pose, shape (4, 4).
     body
         Index of the object among the scene's bodies.
+
+    Returns
+    -------
+    The seal, or None.
     """
     pad = referee_of(config, radius_m)
     surface, _ = surface_under(pad.disc, world_from_gripper, scene.rays, body, scene.clearance_m)
@@ -109,12 +119,20 @@ def judged(
 
     Parameters
     ----------
-    config, radius_m, scene
-        As in `sealed`.
+    config
+        Section referee.
+    radius_m
+        r_G [m].
+    scene
+        Where the bodies are.
     world_from_gripper
         Poses of the pad, shape (n, 4, 4).
     bodies
         Index of each grasp's object among the scene's bodies, shape (n,).
+
+    Returns
+    -------
+    What each grasp bears, in their order.
     """
     rows = np.zeros((len(bodies), 4))
     for row, (pose, body) in enumerate(zip(world_from_gripper, bodies, strict=True)):

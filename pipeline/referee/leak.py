@@ -39,10 +39,18 @@ class Face:
 
         Parameters
         ----------
-        open_share, discharge
-            φ and C_d [1].
-        grain_m, bed_m
-            d, diameter of the grains, and L, thickness of the bed [m].
+        open_share
+            φ, share of the face that is openings [1].
+        discharge
+            C_d of the openings [1].
+        grain_m
+            d, diameter of the grains [m].
+        bed_m
+            L, thickness of the bed [m].
+
+        Returns
+        -------
+        The face.
         """
         solid = 1.0 - GRAIN_VOIDS
         viscous = 150 * AIR_VISCOSITY_PA_S * solid**2 * bed_m / (GRAIN_VOIDS**3 * grain_m**2)
@@ -167,8 +175,14 @@ def leak(
         h > 0 at each vertex, shape (n,) [m].
     open_to_air
         Vertices at the pressure of the atmosphere, shape (n,).
-    face, fan
-        What draws the air.
+    face
+        Openings through which the air goes.
+    fan
+        What draws it.
+
+    Returns
+    -------
+    The vacuum under the face, and the flow.
     """
     vacuum_pa = fan.vacuum_pa
     under_pa = np.zeros(len(film_m))

@@ -47,6 +47,10 @@ class Hold:
         load
             Force [N] and moment [N m] that the object exerts on the pad about its origin, in GCS,
             shape (6,): its weight and inertia. A pull away from the pad is along -z.
+
+        Returns
+        -------
+        True where contact and friction can balance it.
         """
         wanted = self._scaled(-(load + self.suction))
         # SciPy's nnls ends the process on a matrix without columns.
@@ -116,8 +120,14 @@ def suction_wrench(
         The pad's elements.
     vacuum_pa
         p under the face, shape (n,) [Pa].
-    surface_m, on_target
-        Height of the surface and whether it is the object's, shape (n,), GCS.
+    surface_m
+        Height of the surface, shape (n,), GCS [m].
+    on_target
+        Whether it is the object's, shape (n,).
+
+    Returns
+    -------
+    Force [N] and moment [N m] about the pad's origin, shape (6,).
     """
     x, y = disc.vertices_xy_m.T
     pulls = np.where(on_target, vacuum_pa * disc.areas_m2, 0.0)
@@ -157,8 +167,10 @@ def contact_wrenches(
         The pad's elements and patches.
     touches
         Vertices in contact with the object, shape (n,).
-    surface_m, normals
-        Of the surface there, shapes (n,) and (n, 3), GCS.
+    surface_m
+        Height of the surface, shape (n,), GCS [m].
+    normals
+        Unit normals of the surface, shape (n, 3), GCS.
     friction
         μ [1].
 
@@ -208,8 +220,10 @@ def weight_loads(
         Shape (4, 4); gravity is along -z of the world.
     centre_of_mass_m
         Of the object, shape (3,), in the world [m].
-    up_m_s2, side_m_s2
-        Upwards, gravity among it, and sidewards [m/s2].
+    up_m_s2
+        Acceleration upwards, gravity among it [m/s2].
+    side_m_s2
+        Acceleration sidewards [m/s2].
 
     Returns
     -------

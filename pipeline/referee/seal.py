@@ -94,6 +94,10 @@ def seal(referee: Referee, surface: Surface, way: Way = "compiled") -> Seal:
     way
         "plain" solves by SciPy's sparse matrices; "compiled", ten times as fast, is held to it.
 
+    Returns
+    -------
+    The pad's shape, the vacuum, and the wrenches that its contact can give.
+
     Raises
     ------
     ValueError

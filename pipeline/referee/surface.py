@@ -44,8 +44,16 @@ def surface_of(
     ----------
     disc
         The pad's elements.
-    height_m, normals, on_target
-        As in `Surface`, shapes (n,), (n, 3), (n,).
+    height_m
+        Height under each vertex, shape (n,), GCS; -inf where there is none [m].
+    normals
+        Unit normals, shape (n, 3), GCS.
+    on_target
+        Whether it is the object's, shape (n,).
+
+    Returns
+    -------
+    The surface under the pad.
     """
     owner = np.repeat(np.arange(len(height_m)), np.diff(disc.starts))
     beside = np.zeros(len(height_m), dtype=np.bool_)

@@ -53,6 +53,10 @@ def _view(surfaces: RayScene, bodies: Mapping[int, Mesh], camera: PinholeCamera)
         The same by body id, in WCS.
     camera
         Where the picture is taken from.
+
+    Returns
+    -------
+    The exact picture.
     """
     shape = (camera.height_px, camera.width_px)
     origin, directions = pixel_rays(camera, np.ones(shape, dtype=bool))

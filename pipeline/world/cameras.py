@@ -134,6 +134,10 @@ def pixel_slopes(
         Camera matrix in pixels, shape (3, 3).
     shape
         Height and width of the picture [px].
+
+    Returns
+    -------
+    x/z of each column, shape (w,), and y/z of each row, shape (h,).
     """
     k = intrinsics
     return (

@@ -33,6 +33,10 @@ def bodies_at_rest(
         Surface of each object by its name, in the object's own frame [m].
     table_side_m
         Side of the square table at z = 0 [m].
+
+    Returns
+    -------
+    Body id → surface in WCS [m].
     """
     bodies = {p.body_id: meshes[p.object_name].transformed(p.world_from_object) for p in placed}
     return bodies | {TABLE: table_mesh(table_side_m)}

@@ -66,6 +66,10 @@ def read(label: str, data: bytes, max_faces: int, beside: Beside) -> Surface:
     beside
         Reads the files that it keeps its data in.
 
+    Returns
+    -------
+    Triangles over the vertices that they use.
+
     Raises
     ------
     MeshError

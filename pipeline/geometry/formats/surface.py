@@ -37,6 +37,10 @@ def surface_of(label: str, polygons: Polygons, notes: tuple[str, ...] = ()) -> S
     notes
         What the object's record should say already.
 
+    Returns
+    -------
+    Triangles, with what was done to get them.
+
     Raises
     ------
     MeshError
