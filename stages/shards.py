@@ -19,7 +19,7 @@ from pipeline.execution import StageContext, Summary, generator, progress, stage
 from pipeline.labelling.balancing import first_proposals, quality_histogram
 from pipeline.messages.grasps import grasps_of
 from pipeline.messages.samples import sample_batch
-from pipeline.network.samples import SPLITS, Samples, joined_samples
+from pipeline.network.samples import SPLITS, Samples, join_samples
 from pipeline.recording.shards import draw_shards
 from schemas.softgrip.v1.grasps_pb2 import GraspBatch, ShardEntry
 from stages.graph import SHARDS, inputs_of
@@ -40,7 +40,7 @@ def build(stage: StageContext) -> Summary:
             )
         order = generator(stage.config.seed, "shuffle", split).permutation(len(samples))
         entries += write_split(stage, split, samples.take(order), names)
-    every = joined_samples([by_split[split] for split in SPLITS])
+    every = join_samples([by_split[split] for split in SPLITS])
     histogram = quality_histogram(every.quality.astype(np.float64))
     write_index(stage.output, stage.provenance(), entries, histogram)
     return summary(entries, by_split, names)
@@ -56,7 +56,7 @@ def gather(grasps: Path) -> tuple[tuple[str, ...], dict[str, Samples]]:
             for _, message in artifact.messages(GraspBatch):
                 split, samples = as_samples(message, names)
                 parts.setdefault(split, []).append(samples)
-    return tuple(names), {split: joined_samples(found) for split, found in parts.items()}
+    return tuple(names), {split: join_samples(found) for split, found in parts.items()}
 
 
 def as_samples(message: GraspBatch, names: dict[str, int]) -> tuple[str, Samples]:

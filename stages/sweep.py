@@ -39,10 +39,10 @@ from pipeline.messages.sweep import (
 )
 from pipeline.network.family import (
     Member,
-    budgeted,
+    list_members,
     measure_member,
     member_training,
-    members,
+    take_budget,
     time_network_ms,
 )
 from pipeline.network.samples import SPLITS, Samples
@@ -100,14 +100,15 @@ def member_jobs(stage: StageContext) -> list[MemberJob]:
             config=config,
             provenance=stage.provenance(),
         )
-        for member in members(config.sweep, config.network, config.seed)
+        for member in list_members(config.sweep, config.network, config.seed)
     ]
 
 
 def given_samples(config: RunConfig, shards: Path, cache: Path) -> dict[str, Samples]:
     """Split to what every member gets of it."""
     return {
-        split: budgeted(config.sweep, split, cached_split(shards, split, cache)) for split in SPLITS
+        split: take_budget(config.sweep, split, cached_split(shards, split, cache))
+        for split in SPLITS
     }
 
 

@@ -14,15 +14,15 @@ from pipeline.execution import StageContext, Summary, stage_command
 from pipeline.messages.sample_cache import cached_split
 from pipeline.messages.training import CHECKPOINT, EXPORT, epoch_message, result_message
 from pipeline.network.checkpoint import save_checkpoint_bytes
-from pipeline.network.control_inference import ControlPredictor, checked_against
+from pipeline.network.control_inference import ControlPredictor, check_export
 from pipeline.network.export import export_onnx_bytes
 from pipeline.network.ga_cnn import parameter_count
 from pipeline.network.held_out import TestFigures, measure_held_out
-from pipeline.network.parallel import ALONE, Ranks, joined_ranks
+from pipeline.network.parallel import ALONE, Ranks, join_ranks
 from pipeline.network.resuming import EpochMetrics
 from pipeline.network.samples import Samples
 from pipeline.network.timing import runtimes_ms_a_grasp
-from pipeline.network.training import TrainedNetwork, chosen_device, train
+from pipeline.network.training import TrainedNetwork, choose_device, train
 from pipeline.recording.train import draw_train
 from stages.graph import TRAIN, inputs_of
 
@@ -34,7 +34,7 @@ def build(stage: StageContext, ranks: Ranks = ALONE) -> Summary:
     """Train GA-CNN on the train split, stop by the val split, report on the test split."""
     config = stage.config
     train_set, val_set, test_set = (split_of(stage, name) for name in ("train", "val", "test"))
-    on_gpu = chosen_device(config.train.device, ranks).type == "cuda"
+    on_gpu = choose_device(config.train.device, ranks).type == "cuda"
     trained = train(
         config.train,
         config.network,
@@ -87,7 +87,7 @@ def export_for_control(stage: StageContext, trained: TrainedNetwork, test_set: S
     """The network as ONNX, held against the original on test clouds."""
     exported = export_onnx_bytes(trained.network, stage.config.sensing.grid_cells)
     config = stage.config.train
-    difference = checked_against(
+    difference = check_export(
         ControlPredictor(exported, config.threads),
         trained.network,
         test_set.cloud[:COMPARED],
@@ -135,7 +135,7 @@ def summary(
         "stopped_early": trained.stopped_early,
         "val_mae": trained.val_mae,
         **figures.headline(),
-        "device": chosen_device(stage.config.train.device, ranks).type,
+        "device": choose_device(stage.config.train.device, ranks).type,
         "processes": ranks.count,
         "waiting_for_data_share": trained.waiting_share,
         "preparing_inputs_share": trained.preparing_share,
@@ -144,7 +144,7 @@ def summary(
 
 def main() -> None:
     """The stage's command, in every process that torchrun started."""
-    with joined_ranks() as ranks:
+    with join_ranks() as ranks:
         together = update_wrapper(partial(build, ranks=ranks), build)
         stage_command(TRAIN, together, inputs_of, ranks.rank, draw_train)
 

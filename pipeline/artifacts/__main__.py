@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from pipeline.artifacts.inspection import Contents, contents_of, run_folder, verified
+from pipeline.artifacts.inspection import Contents, read_contents, run_folder, verify_files
 from pipeline.errors import SoftgripError
 
 EXIT_FAILURE = 1  # what shells read as a failure
@@ -18,7 +18,7 @@ File = Annotated[Path, typer.Argument(help="an .mcap of a run")]
 @app.command()
 def inspect(file: File) -> None:
     """Stage, versions, provenance and counts of an artifact."""
-    sys.stdout.write(described(contents_of(file)))
+    sys.stdout.write(describe(read_contents(file)))
 
 
 @app.command()
@@ -30,7 +30,7 @@ def verify(
 ) -> None:
     """Hash a file and all it was made from, up to the meshes; non-zero where one differs."""
     wrong = whole = 0
-    for finding in verified(file, mesh_dir or noted_mesh_dir(file)):
+    for finding in verify_files(file, mesh_dir or read_mesh_dir_note(file)):
         if finding.problem:
             wrong += 1
             sys.stdout.write(f"wrong  {finding.path}: {finding.problem}\n")
@@ -42,14 +42,14 @@ def verify(
         raise typer.Exit(EXIT_FAILURE)
 
 
-def noted_mesh_dir(file: Path) -> Path | None:
+def read_mesh_dir_note(file: Path) -> Path | None:
     """The mesh folder that Make noted in the run, if any."""
     note = run_folder(file) / ".state" / "mesh_dir"
     named = note.read_text().strip() if note.is_file() else ""
     return Path(named) if named else None
 
 
-def described(contents: Contents) -> str:
+def describe(contents: Contents) -> str:
     """The report of ``inspect``."""
     made = contents.provenance
     lines = [

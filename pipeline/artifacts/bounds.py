@@ -179,7 +179,7 @@ def check_chunk(file: BoundedFile, index: ChunkIndex) -> None:
         raise file.damaged(f"a chunk declares {declared} bytes and its content {found}")
 
 
-def checked_attachment(file: BoundedFile, index: AttachmentIndex) -> bytes:
+def read_attachment_record(file: BoundedFile, index: AttachmentIndex) -> bytes:
     """Read the record of an attachment and compare it with its checksum.
 
     Parameters

@@ -60,7 +60,7 @@ class Finding:
     problem: str = ""
 
 
-def contents_of(path: Path) -> Contents:
+def read_contents(path: Path) -> Contents:
     """Read provenance, schemas, counts, attachments and shards of an artifact.
 
     Parameters
@@ -90,7 +90,7 @@ def contents_of(path: Path) -> Contents:
         )
 
 
-def verified(path: Path, mesh_dir: Path | None) -> Iterator[Finding]:
+def verify_files(path: Path, mesh_dir: Path | None) -> Iterator[Finding]:
     """Compare a file, and everything it was made from up to the meshes, with the recorded digests.
 
     Every byte of every artifact is read, each file once, however many others name it.
@@ -116,7 +116,7 @@ def verified(path: Path, mesh_dir: Path | None) -> Iterator[Finding]:
             continue
         seen.add(file)
         try:
-            inputs, shards = _named_by(file)
+            inputs, shards = _read_named_files(file)
         except ArtifactError as error:
             yield Finding(file, str(error))
             continue
@@ -149,7 +149,7 @@ def run_folder(path: Path) -> Path:
     return path.resolve().parent
 
 
-def _named_by(file: Path) -> tuple[tuple[Input, ...], list[Input]]:
+def _read_named_files(file: Path) -> tuple[tuple[Input, ...], list[Input]]:
     """What a whole file names: what it was made from, and its shards."""
     with open_artifact(file) as artifact:
         artifact.check()

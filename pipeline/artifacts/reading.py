@@ -20,7 +20,7 @@ from pipeline.artifacts.bounds import (
     check_chunk,
     check_data,
     check_index,
-    checked_attachment,
+    read_attachment_record,
 )
 from pipeline.artifacts.provenance import METADATA_NAME, Provenance
 from pipeline.errors import ArtifactError, ContentError
@@ -117,7 +117,7 @@ class Artifact:
         with _named(self.path):
             for index in self._summary.attachment_indexes:
                 if index.name == name:
-                    record = io.BytesIO(checked_attachment(self._file, index))
+                    record = io.BytesIO(read_attachment_record(self._file, index))
                     return bytes(Attachment.read(ReadDataStream(record)).data)
         raise ArtifactError(f"{self.path} has no attachment '{name}'", "Make the file again")
 

@@ -79,7 +79,7 @@ def step_ms(
             picture = DepthPicture(depth_m, window)
             times.append(time.perf_counter())
             found = local.look(picture, aim)
-            local.passed_on(aim)
+            local.advance_aim(aim)
             if found is None:
                 break  # too steep a place: no network was asked
             times.append(time.perf_counter())

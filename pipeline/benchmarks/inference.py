@@ -3,7 +3,7 @@
 import os
 
 from pipeline.config.learning import NetworkConfig
-from pipeline.network.control_inference import ControlPredictor, checked_against
+from pipeline.network.control_inference import ControlPredictor, check_export
 from pipeline.network.export import export_onnx_bytes
 from pipeline.network.ga_cnn import GaCnn, build_network
 from pipeline.network.samples import Samples
@@ -36,7 +36,7 @@ def figures(config: NetworkConfig, samples: Samples) -> dict[str, object]:
             for name, found in times.items()
         },
         "inference_layers": config.layers,
-        "inference_difference": checked_against(
+        "inference_difference": check_export(
             exported, network, cloud, mask, _CHECKED_BATCH, THREADS
         ),
     }

@@ -10,7 +10,7 @@ from pipeline.control.cloud import DepthPicture, merged_cloud
 from pipeline.control.ranking import Ranking
 
 
-def corrected(
+def correct_aim(
     picture: DepthPicture,
     aim: Float[np.ndarray, "4 4"],
     ranking: Ranking,

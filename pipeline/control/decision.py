@@ -73,7 +73,7 @@ class Decision:
         How often the aim was corrected by a picture.
     regrasps
         How often the object was grasped again after a tug that did not hold.
-    spoilt_m
+    failed_contacts_m
         Contacts in WCS that did not hold in the first tug [m], each of shape (3,).
     pictures
         Depth images that the last choice was made from.
@@ -86,5 +86,5 @@ class Decision:
     world_from_contact: Float[np.ndarray, "4 4"] = field(default_factory=lambda: np.eye(4))
     corrections: int = 0
     regrasps: int = 0
-    spoilt_m: list[Float[np.ndarray, " 3"]] = field(default_factory=list)
+    failed_contacts_m: list[Float[np.ndarray, " 3"]] = field(default_factory=list)
     pictures: list[DepthPicture] = field(default_factory=list)

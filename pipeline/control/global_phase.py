@@ -19,11 +19,11 @@ from pipeline.control.regrasp import top_of_column_m, worth_with_lever
 from pipeline.control.robot import Eyes, Robot
 from pipeline.control.unseen import unseen_contacts
 from pipeline.control.viewpoints import (
-    backed_off,
-    best_apart,
-    facing,
+    back_off,
+    choose_apart,
     gripper_above,
-    turned_about,
+    turn_half_about_approach,
+    turn_least,
 )
 
 Pose = Float[np.ndarray, "4 4"]
@@ -116,16 +116,16 @@ class GlobalPhase:
             if isinstance(more, Cause):
                 return more
             pictures = [*pictures, *more]
-        cloud, unseen = self._cloud(pictures), self._unseen(pictures)
+        cloud, unseen = self._cloud(pictures), self._unseen_contacts(pictures)
         if len(cloud) == 0 and len(unseen) == 0:
             return Cause.EMPTY_CLOUD
         decision.pictures = pictures
-        found = self._unspoilt(self._sampled(cloud))
+        found = self._without_failed(self._sample(cloud))
         quality = self._ranking(pictures, found) if len(found) else np.empty(0)
         decision.candidates, decision.quality = found.world_from_contact, quality
         self._ranked = [
-            *self._free(cloud, found, quality, best_first=quality),
-            *self._felt_for(cloud, unseen),
+            *self._rank_free(cloud, found, quality, best_first=quality),
+            *self._rank_unmeasured(cloud, unseen),
         ]
         return None if self._ranked else Cause.NO_CANDIDATE
 
@@ -173,13 +173,15 @@ class GlobalPhase:
         top = top_of_column_m(cloud, place_m, self._policy.regrasp_column_m)
         if top is None:
             return None
-        found = self._unspoilt(self._sampled_near(cloud, top))
+        found = self._without_failed(self._sample_near(cloud, top))
         if len(found) == 0:
             return None
         quality = self._ranking(pictures, found)
         worth = worth_with_lever(quality, found, place_m, lever_m, self._policy)
         nearer = worth > 0.0
-        ranked = self._free(cloud, found.take(nearer), quality[nearer], best_first=worth[nearer])
+        ranked = self._rank_free(
+            cloud, found.take(nearer), quality[nearer], best_first=worth[nearer]
+        )
         return self._first_of(ranked, least=0.0)
 
     def _look_closer(
@@ -190,15 +192,15 @@ class GlobalPhase:
         For what depth does not show a look that is left becomes two, from opposite sides: the
         outlines lean over it alike, and its middle is between.
         """
-        found = self._unspoilt(self._sampled(self._cloud(pictures)))
+        found = self._without_failed(self._sample(self._cloud(pictures)))
         quality = self._ranking(pictures, found) if len(found) else np.empty(0)
         places = found.world_from_contact[:, :3, 3]
         wanted = self._policy.wrist_views
-        apart = best_apart(places, quality, wanted, self._policy.look_apart_m)
+        apart = choose_apart(places, quality, wanted, self._policy.look_apart_m)
         here = self._robot.pose()
         looks = [(place, here) for place in apart]
-        for contact in self._unseen(pictures)[: wanted - len(looks)]:
-            looks += [(contact[:3, 3], here), (contact[:3, 3], turned_about(here))]
+        for contact in self._unseen_contacts(pictures)[: wanted - len(looks)]:
+            looks += [(contact[:3, 3], here), (contact[:3, 3], turn_half_about_approach(here))]
         more = []
         for place, heading in looks:
             pose = gripper_above(place, self._policy.wrist_view_m, heading)
@@ -220,11 +222,11 @@ class GlobalPhase:
             distance = [np.linalg.norm(place - aim) for aim in self._rejected_m]
             if min(distance, default=np.inf) < self._policy.another_m:
                 continue
-            if self._can_reach(facing(choice.world_from_contact, self._robot.pose())):
+            if self._can_reach(turn_least(choice.world_from_contact, self._robot.pose())):
                 return choice
         return None
 
-    def _free(
+    def _rank_free(
         self,
         cloud: Cloud,
         found: Candidates,
@@ -237,20 +239,20 @@ class GlobalPhase:
         order = np.argsort(-best_first, kind="stable")
         return [Choice(poses[i], float(quality[i])) for i in order if free[i]]
 
-    def _felt_for(self, cloud: Cloud, contacts: Sequence[Pose]) -> list[Choice]:
+    def _rank_unmeasured(self, cloud: Cloud, contacts: Sequence[Pose]) -> list[Choice]:
         """Those down to which the rigid parts meet nothing measured; what failed before, last."""
         poses = np.array(contacts).reshape(-1, 4, 4)
         free = free_of_collision(poses, cloud.points_m, self._config.hand)
-        order = np.argsort(~self._fresh(poses[:, :3, 3]), kind="stable")
+        order = np.argsort(~self._not_failed(poses[:, :3, 3]), kind="stable")
         return [Choice(poses[i], 0.0, felt_for=True) for i in order if free[i]]
 
     def _cloud(self, pictures: Sequence[DepthPicture]) -> Cloud:
         return merged_cloud(pictures, self._policy.voxel_m, self._policy.above_table_m)
 
-    def _unseen(self, pictures: Sequence[DepthPicture]) -> list[Pose]:
+    def _unseen_contacts(self, pictures: Sequence[DepthPicture]) -> list[Pose]:
         return unseen_contacts(pictures, self._policy.unseen, self._policy.above_table_m)
 
-    def _sampled(self, cloud: Cloud) -> Candidates:
+    def _sample(self, cloud: Cloud) -> Candidates:
         return sample_candidates(
             cloud,
             self._policy.candidates,
@@ -259,7 +261,7 @@ class GlobalPhase:
             self._rng,
         )
 
-    def _sampled_near(self, cloud: Cloud, place_m: Float[np.ndarray, " 3"]) -> Candidates:
+    def _sample_near(self, cloud: Cloud, place_m: Float[np.ndarray, " 3"]) -> Candidates:
         return sample_near(
             cloud,
             place_m,
@@ -270,12 +272,12 @@ class GlobalPhase:
             self._rng,
         )
 
-    def _unspoilt(self, found: Candidates) -> Candidates:
+    def _without_failed(self, found: Candidates) -> Candidates:
         """Without those too near to a contact that failed before; all, where no other is left."""
-        fresh = self._fresh(found.world_from_contact[:, :3, 3])
+        fresh = self._not_failed(found.world_from_contact[:, :3, 3])
         return found.take(fresh) if fresh.any() else found
 
-    def _fresh(self, places_m: Float[np.ndarray, "k 3"]) -> Bool[np.ndarray, " k"]:
+    def _not_failed(self, places_m: Float[np.ndarray, "k 3"]) -> Bool[np.ndarray, " k"]:
         fresh = np.ones(len(places_m), dtype=bool)
         for contact in self._avoid_m:
             distance = np.linalg.norm(places_m - contact, axis=1)
@@ -283,5 +285,5 @@ class GlobalPhase:
         return fresh
 
     def _can_reach(self, contact: Pose) -> bool:
-        above = backed_off(contact, self._policy.standoff_m)
+        above = back_off(contact, self._policy.standoff_m)
         return self._robot.reachable(above) and self._robot.reachable(contact)

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from pipeline.config.evaluation import EvaluateConfig
 from pipeline.control.cloud import DepthPicture, merged_cloud
-from pipeline.control.correction import corrected
+from pipeline.control.correction import correct_aim
 from pipeline.control.motion import Motion
 from pipeline.control.ranking import Ranking
 
@@ -49,7 +49,7 @@ class LocalPhase:
         policy = self._config.policy
         cloud = merged_cloud([picture], policy.voxel_m, policy.above_table_m)
         self._motion.see(cloud.points_m, aim[:3, 3])
-        return corrected(
+        return correct_aim(
             picture,
             aim,
             self._ranking,
@@ -58,13 +58,13 @@ class LocalPhase:
             self._rng,
         )
 
-    def met(self, aim: Pose, here: Pose) -> Pose:
+    def predict_meeting(self, aim: Pose, here: Pose) -> Pose:
         """Where the aim will be when the pad, now at ``here``, reaches it."""
         return self._after(way_left_m(aim, here) / self._config.policy.speed_m_s, aim)
 
-    def passed_on(self, aim: Pose) -> Pose:
+    def advance_aim(self, aim: Pose) -> Pose:
         """Count one control period and return where the aim is after it."""
-        self._motion.passed()
+        self._motion.count_period()
         return self._after(1.0 / self._config.policy.rate_hz, aim)
 
     def _after(self, time_s: float, aim: Pose) -> Pose:

@@ -39,7 +39,7 @@ class Motion:
         self._periods = 0
         self.velocity_m_s = np.zeros(3)
 
-    def passed(self) -> None:
+    def count_period(self) -> None:
         """Count one control period."""
         self._periods += 1
 

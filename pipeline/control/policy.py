@@ -20,10 +20,10 @@ from pipeline.config.evaluation import EvaluateConfig
 from pipeline.control.decision import Cause, Decision, Strategy
 from pipeline.control.global_phase import Choice, GlobalPhase
 from pipeline.control.local_phase import LocalPhase, way_left_m
-from pipeline.control.regrasp import hangs_below_m
+from pipeline.control.regrasp import load_place_m
 from pipeline.control.robot import Eyes, Reading, Robot, State
-from pipeline.control.viewpoints import backed_off, facing
-from pipeline.control.wrench_monitor import Event, WrenchMonitor, hanging_n, trimmed
+from pipeline.control.viewpoints import back_off, turn_least
+from pipeline.control.wrench_monitor import Event, WrenchMonitor, hanging_n, trim_pose
 
 Phase = tuple[State, Callable[[], Cause | None]]
 
@@ -111,20 +111,20 @@ class Attempt:
         cause = self._global.look(self.decision, self._travel if several_views else None)
         if cause is not None:
             return cause
-        return None if self._aims_at(self._global.best(least=0.0)) else Cause.UNREACHABLE
+        return None if self._aim_at(self._global.best(least=0.0)) else Cause.UNREACHABLE
 
-    def _retargeted(self) -> bool:
+    def _retarget(self) -> bool:
         """Whether, seen from near, the aim promises clearly less than another; then aim there."""
         if self._retargets_left == 0:
             return False
         wanted = self.decision.predicted_quality + self._policy.retarget_gain
-        if not self._aims_at(self._global.better_than(self.decision.world_from_contact, wanted)):
+        if not self._aim_at(self._global.better_than(self.decision.world_from_contact, wanted)):
             return False
         self._retargets_left -= 1
         return True
 
     def _go_above(self) -> Cause | None:
-        return self._travel(backed_off(self.decision.world_from_contact, self._policy.standoff_m))
+        return self._travel(back_off(self.decision.world_from_contact, self._policy.standoff_m))
 
     def _approach(self) -> Cause | None:
         """The local phase: take a picture, correct, step; until the pad touches.
@@ -137,19 +137,19 @@ class Attempt:
             here = self._robot.pose()
             if self._strategy.corrects and not self._felt_for and self._sees(aim, here):
                 cause = self._correct()
-                if cause is None and self._retargeted():
+                if cause is None and self._retarget():
                     cause = self._go_above()
                 if cause is not None:
                     return cause
                 aim = self.decision.world_from_contact
             if self._local.moves and not self._robot.reachable(aim):
                 return Cause.UNREACHABLE
-            ahead = backed_off(self._local.met(aim, here), -self._search_m())
+            ahead = back_off(self._local.predict_meeting(aim, here), -self._search_m())
             reading = self._robot.step(ahead, self._policy.speed_m_s)
-            self.decision.world_from_contact = self._local.passed_on(aim)
+            self.decision.world_from_contact = self._local.advance_aim(aim)
             event = self._monitor.moving(reading)
             if event is Event.COLLISION:
-                self._travel(backed_off(self._robot.pose(), self._policy.retreat_m))
+                self._travel(back_off(self._robot.pose(), self._policy.retreat_m))
                 return Cause.COLLISION
             if event is Event.BLOCKED:
                 return Cause.UNREACHABLE
@@ -157,7 +157,7 @@ class Attempt:
                 return None
             if reading.arrived:
                 break
-        self._travel(backed_off(self._robot.pose(), self._policy.retreat_m + self._search_m()))
+        self._travel(back_off(self._robot.pose(), self._policy.retreat_m + self._search_m()))
         return Cause.NO_CONTACT
 
     def _search_m(self) -> float:
@@ -211,33 +211,33 @@ class Attempt:
         if self._monitor.holds(readings[-1]):
             return None
         self._robot.vacuum(on=False)
-        self._travel(backed_off(start, self._policy.retreat_m))
-        self.decision.spoilt_m.append(self.decision.world_from_contact[:3, 3])
+        self._travel(back_off(start, self._policy.retreat_m))
+        self.decision.failed_contacts_m.append(self.decision.world_from_contact[:3, 3])
         if self._regrasps_left == 0:
             return Cause.NO_SEAL
-        if not (self._aims_nearer(max(readings, key=hanging_n)) or self._aims_elsewhere()):
+        if not (self._aim_nearer(max(readings, key=hanging_n)) or self._aim_elsewhere()):
             return Cause.NO_SEAL
         self._regrasps_left -= 1
         self.decision.regrasps += 1
         return self._through(*self._to_the_seal())
 
-    def _aims_nearer(self, felt: Reading) -> bool:
+    def _aim_nearer(self, felt: Reading) -> bool:
         """Whether there is a contact nearer to where the load hangs; then aim there."""
         if not self._monitor.holds(felt):
             return False
-        place = hangs_below_m(felt, self._config.hand.length_m)
+        place = load_place_m(felt, self._config.hand.length_m)
         lever_m = float(np.linalg.norm(place - felt.world_from_gripper[:2, 3]))
         if lever_m < self._policy.regrasp_lever_m:
             return False  # it is the seal that is weak
-        if not self._aims_at(self._global.nearer_to(place, lever_m, self.decision.pictures)):
+        if not self._aim_at(self._global.nearer_to(place, lever_m, self.decision.pictures)):
             return False
         self._retargets_left = 0  # what is felt outweighs what is seen
         return True
 
-    def _aims_elsewhere(self) -> bool:
+    def _aim_elsewhere(self) -> bool:
         """Whether a place is left that promises enough; then aim there."""
-        self._global.reject(self.decision.spoilt_m)
-        return self._aims_at(self._global.best(self._policy.regrasp_quality))
+        self._global.reject(self.decision.failed_contacts_m)
+        return self._aim_at(self._global.best(self._policy.regrasp_quality))
 
     def _lift(self) -> Cause | None:
         """Up, trimming the pose to lessen moments at the base; slower after a slip."""
@@ -249,7 +249,7 @@ class Attempt:
             target = self._robot.pose()
             risen = target[2, 3] - start[2, 3]
             if reading is not None and left > 0 and risen >= self._policy.trim_from_m:
-                target, turned = trimmed(target, reading.wrench, left, self._policy)
+                target, turned = trim_pose(target, reading.wrench, left, self._policy)
                 left -= turned
             target[:2, 3], target[2, 3] = start[:2, 3], start[2, 3] + height
             reading = self._robot.step(target, speed)
@@ -284,7 +284,7 @@ class Attempt:
             readings.append(self._robot.step(target, self._policy.speed_m_s))
         return readings
 
-    def _aims_at(self, choice: Choice | None) -> bool:
+    def _aim_at(self, choice: Choice | None) -> bool:
         if choice is None:
             return False
         self._aim(choice.world_from_contact, choice.quality)
@@ -293,5 +293,5 @@ class Attempt:
         return True
 
     def _aim(self, pose: Float[np.ndarray, "4 4"], quality: float) -> None:
-        self.decision.world_from_contact = facing(pose, self._robot.pose())
+        self.decision.world_from_contact = turn_least(pose, self._robot.pose())
         self.decision.predicted_quality = float(quality)

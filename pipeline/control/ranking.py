@@ -50,12 +50,12 @@ class NetworkRanking:
             views, candidates.world_from_contact, self._sensing, self._radius_m
         )
         quality = np.asarray(self._predict(cloud, seen), dtype=np.float64)
-        return smoothed(
+        return smooth_quality(
             candidates, quality, self._policy.smoothing_m, self._policy.smoothing_tilt_rad
         )
 
 
-def smoothed(
+def smooth_quality(
     candidates: Candidates,
     quality: Float[np.ndarray, " k"],
     within_m: float,

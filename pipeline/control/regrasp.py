@@ -15,7 +15,7 @@ from pipeline.control.robot import Reading
 from pipeline.control.wrench_monitor import line_of_load
 
 
-def hangs_below_m(felt: Reading, base_above_pad_m: float) -> Float[np.ndarray, " 2"]:
+def load_place_m(felt: Reading, base_above_pad_m: float) -> Float[np.ndarray, " 2"]:
     """Horizontal place in WCS of the line on which the load's weight acts: its centre of mass.
 
     The line of action of the force at the base, followed to the height of the pad.

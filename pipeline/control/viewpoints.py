@@ -4,7 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 
-def best_apart(
+def choose_apart(
     places_m: Float[np.ndarray, "k 3"], quality: Float[np.ndarray, " k"], count: int, apart_m: float
 ) -> list[Float[np.ndarray, " 3"]]:
     """The most promising places, each at least ``apart_m`` from those before; at most ``count``."""
@@ -30,12 +30,14 @@ def gripper_above(
     return pose
 
 
-def turned_about(world_from_gripper: Float[np.ndarray, "4 4"]) -> Float[np.ndarray, "4 4"]:
+def turn_half_about_approach(
+    world_from_gripper: Float[np.ndarray, "4 4"],
+) -> Float[np.ndarray, "4 4"]:
     """The pose turned by half a turn about its approach: the wrist's camera looks from opposite."""
     return np.asarray(world_from_gripper * np.array([-1.0, -1.0, 1.0, 1.0]))
 
 
-def facing(
+def turn_least(
     world_from_contact: Float[np.ndarray, "4 4"], before: Float[np.ndarray, "4 4"]
 ) -> Float[np.ndarray, "4 4"]:
     """The pose turned about its approach axis so that the wrist turns as little as possible.
@@ -53,7 +55,7 @@ def facing(
     return pose
 
 
-def backed_off(
+def back_off(
     world_from_contact: Float[np.ndarray, "4 4"], distance_m: float
 ) -> Float[np.ndarray, "4 4"]:
     """The pose moved by a distance [m] against its approach direction; negative: ahead."""

@@ -68,7 +68,7 @@ def line_of_load(wrench: Float[np.ndarray, " 6"]) -> Float[np.ndarray, " 3"]:
     return np.asarray(np.cross(force, moment) / max(float(force @ force), 1e-12))
 
 
-def trimmed(
+def trim_pose(
     world_from_gripper: Float[np.ndarray, "4 4"],
     wrench: Float[np.ndarray, " 6"],
     left_rad: float,

@@ -49,7 +49,7 @@ def code_digests(module: str, without: tuple[str, ...] = DRAWING + RUNNING) -> d
     """
     return {
         _source_of(name).relative_to(ROOT).as_posix(): _digest_of(_source_of(name), name)
-        for name in reached(module, without)
+        for name in reached_modules(module, without)
         if not _is_config(name) or _decides(name)
     }
 
@@ -57,13 +57,13 @@ def code_digests(module: str, without: tuple[str, ...] = DRAWING + RUNNING) -> d
 def foreign_imports(module: str, without: tuple[str, ...] = DRAWING + RUNNING) -> set[str]:
     """Dotted names of modules of other projects that a module reaches by import."""
     found = set()
-    for name in reached(module, without):
+    for name in reached_modules(module, without):
         imports = _parsed(_source_of(name)).imports
         found |= {other for other in imports if other.split(".")[0] not in OUR_PACKAGES}
     return found
 
 
-def reached(module: str, without: tuple[str, ...] = DRAWING + RUNNING) -> list[str]:
+def reached_modules(module: str, without: tuple[str, ...] = DRAWING + RUNNING) -> list[str]:
     """Our modules that a module reaches by import, itself and its packages included, sorted."""
     waiting, seen = [module], set()
     while waiting:

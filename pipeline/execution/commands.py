@@ -14,7 +14,7 @@ EXIT_FAILURE = 1  # what shells read as a failure
 
 def run_command(command: Callable[..., None] | typer.Typer) -> None:
     """Run a function, or a typer app of several, as a command line; exit non-zero on failure."""
-    words_to(sys.stderr)
+    log_to(sys.stderr)
     app = command
     if not isinstance(app, typer.Typer):
         app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
@@ -26,7 +26,7 @@ def run_command(command: Callable[..., None] | typer.Typer) -> None:
         sys.exit(EXIT_FAILURE)
 
 
-def words_to(sink: TextIO, level: str = "INFO") -> None:
+def log_to(sink: TextIO, level: str = "INFO") -> None:
     """Send log messages to ``sink``, one a line, without date or place in the code."""
     logger.remove()
     logger.add(sink, level=level, format="{message}")

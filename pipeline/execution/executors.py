@@ -78,7 +78,7 @@ def run_in_order(
     waiting: deque[Future[Result]] = deque()
     try:
         for item in items:
-            waiting.append(_submitted(pool, job, item))
+            waiting.append(_submit(pool, job, item))
             if len(waiting) >= workers * ahead_per_worker:
                 yield waiting.popleft().result()
         while waiting:
@@ -95,23 +95,21 @@ def run_in_order(
         pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _submitted(
-    pool: ProcessPoolExecutor, job: Callable[[Item], Result], item: Item
-) -> Future[Result]:
+def _submit(pool: ProcessPoolExecutor, job: Callable[[Item], Result], item: Item) -> Future[Result]:
     """Submit an item, and report a pool that breaks meanwhile as `BrokenProcessPool`.
 
     Submitting may start a process. The pool closes its pipes when a worker dies; starting another
     one then fails on the closed pipes with another error.
     """
     try:
-        with _interrupts_put_off():
+        with _defer_interrupts():
             return pool.submit(job, item)
     except (ValueError, OSError) as error:
         raise BrokenProcessPool(f"no further worker could be started: {error}") from error
 
 
 @contextmanager
-def _interrupts_put_off() -> Iterator[None]:
+def _defer_interrupts() -> Iterator[None]:
     """Start workers that never receive SIGINT, not even while their interpreter starts.
 
     A terminal sends SIGINT to the whole process group, and only the driver is to end the run. The

@@ -24,7 +24,7 @@ DEVICES = ("nvidia[0-9]*", "dri/renderD*")
 CHOICES = ("VK_ICD_FILENAMES", "VK_DRIVER_FILES")
 
 
-def told_renderer(name: RendererName, memo: Path) -> str:
+def identify_renderer(name: RendererName, memo: Path) -> str:
     """The renderer with its device and driver.
 
     Parameters

@@ -19,14 +19,14 @@ from loguru import logger
 from pipeline.artifacts import publish_bytes
 from pipeline.artifacts.publishing import CANNOT_WRITE, remove_abandoned_scratch, write_error
 from pipeline.errors import SoftgripError
-from pipeline.execution.commands import EXIT_FAILURE, words_to
+from pipeline.execution.commands import EXIT_FAILURE, log_to
 from pipeline.execution.executors import Executor
 from pipeline.execution.stage import RunFolder, Stage, StageContext
 from pipeline.execution.staleness import (
     MEMO,
     InputsOf,
     artifact_is_fresh,
-    drawn_note,
+    drawing_note_path,
     is_fresh,
     stage_context,
 )
@@ -111,8 +111,8 @@ def run_stage(
     started, spent_s = time.perf_counter(), processor_time_s()
     if draw is not None and not force and artifact_is_fresh(context):
         logger.info("{}: the artifact is up to date, its recording is drawn anew", name)
-        record = kept_summary(context.folder, name)
-        drawn(context, draw, record)
+        record = read_summary(context.folder, name)
+        draw_recording(context, draw, record)
         _publish_summary(context, record | _recording_size(context))
         os.utime(output)
         logger.info("{}: drawn in {:.1f} s", name, time.perf_counter() - started)
@@ -120,7 +120,7 @@ def run_stage(
     logger.info("{}: started ({} workers)", name, context.workers)
     figures = build(context)
     if draw is not None:
-        drawn(context, draw, figures)
+        draw_recording(context, draw, figures)
     wall_s, spent_s = time.perf_counter() - started, processor_time_s() - spent_s
     record = {
         "stage": name,
@@ -134,14 +134,14 @@ def run_stage(
     logger.info("{}: done in {:.1f} s, {}", name, wall_s, output)
 
 
-def drawn(context: StageContext, draw: Draw, figures: Summary) -> None:
+def draw_recording(context: StageContext, draw: Draw, figures: Summary) -> None:
     """Draw the recording, and record the key that it was drawn with."""
     draw(context, figures)
     note = context.drawing_key.to_json().encode()
-    publish_bytes(drawn_note(context.folder, context.name), note)
+    publish_bytes(drawing_note_path(context.folder, context.name), note)
 
 
-def kept_summary(folder: RunFolder, stage: str) -> Summary:
+def read_summary(folder: RunFolder, stage: str) -> Summary:
     """Read the summary of a finished stage; empty where the file is missing or damaged."""
     try:
         return dict(json.loads(folder.summary(stage).read_text()))
@@ -185,7 +185,7 @@ def _exclusive(folder: RunFolder, stage: Stage) -> Iterator[None]:
 @contextmanager
 def _readable_failures(stage: Stage, folder: RunFolder, rank: int) -> Iterator[None]:
     """Every failure ends in one sentence and a non-zero exit; the trace goes to the log."""
-    words_to(sys.stderr, "ERROR" if rank else "INFO")
+    log_to(sys.stderr, "ERROR" if rank else "INFO")
     signal.signal(signal.SIGTERM, _as_interrupt)
     log = folder.log(f"{stage.name}.rank{rank}" if rank else stage.name)
     try:
@@ -204,12 +204,12 @@ def _readable_failures(stage: Stage, folder: RunFolder, rank: int) -> Iterator[N
         _trace(error)
         raise SystemExit(EXIT_INTERRUPTED) from None
     except Exception as error:  # noqa: BLE001 - the last line of defence, told and logged
-        logger.error("{}: {}", stage.name, _told(error, folder, log))
+        logger.error("{}: {}", stage.name, _failure_sentence(error, folder, log))
         _trace(error)
         raise SystemExit(EXIT_FAILURE) from None
 
 
-def _told(error: Exception, folder: RunFolder, log: Path) -> str:
+def _failure_sentence(error: Exception, folder: RunFolder, log: Path) -> str:
     """The sentence for a failure that is no SoftgripError: the disk cannot be written, or a bug."""
     if isinstance(error, OSError) and error.errno in CANNOT_WRITE:
         return str(write_error(Path(error.filename or folder.path), error))

@@ -10,7 +10,7 @@ from pipeline.config import load_run_config
 from pipeline.errors import ArtifactError, ConfigError
 from pipeline.execution.code import DRAWING, RUNNING
 from pipeline.execution.freshness import Key, drawing_key, key_from_json, stage_key
-from pipeline.execution.renderer import told_renderer
+from pipeline.execution.renderer import identify_renderer
 from pipeline.execution.stage import RunFolder, Stage, StageContext
 from schemas.softgrip.v1.grasps_pb2 import ShardIndex
 
@@ -71,7 +71,7 @@ def stage_context(
             )
     renderer = ""
     if stage.renders:
-        renderer = told_renderer(config.cameras.renderer, folder.state(RENDERER_MEMO))
+        renderer = identify_renderer(config.cameras.renderer, folder.state(RENDERER_MEMO))
     without = DRAWING + RUNNING if stage.drawn_apart else RUNNING
     key = stage_key(
         config, stage.sections, stage.module, inputs, folder.state(memo), renderer, without
@@ -150,11 +150,11 @@ def built_key(folder: RunFolder, stage: str) -> Key | None:
 def drawn_key(folder: RunFolder, stage: str) -> Key | None:
     """The key that a stage's recording was drawn with; None where there is none to be read."""
     try:
-        return key_from_json(drawn_note(folder, stage).read_text())
+        return key_from_json(drawing_note_path(folder, stage).read_text())
     except (FileNotFoundError, ValueError):
         return None
 
 
-def drawn_note(folder: RunFolder, stage: str) -> Path:
+def drawing_note_path(folder: RunFolder, stage: str) -> Path:
     """File of the run's state that holds the key a recording was drawn with."""
     return folder.state(f"{stage}.drawn.json")

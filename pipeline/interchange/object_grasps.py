@@ -109,7 +109,7 @@ def split_by_body(
         )
 
 
-def joined_grasps(parts: Sequence[ObjectGrasps]) -> ObjectGrasps:
+def join_grasps(parts: Sequence[ObjectGrasps]) -> ObjectGrasps:
     """Join several sets of one object's grasps, in order; at least one."""
     arrays = ("object_from_base", "quality", "pressure", "wrench", "level")
     return ObjectGrasps(

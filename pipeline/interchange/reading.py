@@ -4,11 +4,11 @@ from pathlib import Path
 
 from pipeline.artifacts import from_tensor, open_artifact
 from pipeline.artifacts.sharding import listed_shards
-from pipeline.interchange.object_grasps import ObjectGrasps, joined_grasps, split_by_body
+from pipeline.interchange.object_grasps import ObjectGrasps, join_grasps, split_by_body
 from pipeline.messages.grasps import grasps_of
 from pipeline.messages.objects import read_objects
 from pipeline.messages.samples import samples_of
-from pipeline.network.samples import Samples, joined_samples
+from pipeline.network.samples import Samples, join_samples
 from schemas.softgrip.v1.grasps_pb2 import GraspBatch
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 from schemas.softgrip.v1.scenes_pb2 import Scene
@@ -48,11 +48,11 @@ def grasps_by_object(objects: Path, scenes: Path, grasps: Path) -> list[ObjectGr
             for _, message in artifact.messages(GraspBatch):
                 for part in split_by_body(*grasps_of(message), catalogue, poses):
                     parts.setdefault(part.item.name, []).append(part)
-    return [joined_grasps(parts[name]) for name in catalogue if name in parts]
+    return [join_grasps(parts[name]) for name in catalogue if name in parts]
 
 
 def read_shard(shard: Path) -> tuple[Samples, tuple[str, ...]]:
     """All samples of a shard, and the names that their ``object_index`` points into."""
     with open_artifact(shard) as artifact:
         messages = [message for _, message in artifact.messages(SampleBatch)]
-    return joined_samples([samples_of(m) for m in messages]), tuple(messages[0].object_names)
+    return join_samples([samples_of(m) for m in messages]), tuple(messages[0].object_names)

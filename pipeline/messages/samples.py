@@ -7,7 +7,7 @@ from pathlib import Path
 from pipeline.artifacts.reading import open_artifact
 from pipeline.artifacts.sharding import listed_shards
 from pipeline.artifacts.tensors import set_tensors, tensors_of
-from pipeline.network.samples import Samples, joined_samples
+from pipeline.network.samples import Samples, join_samples
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 
 STORED_AS = {
@@ -74,7 +74,7 @@ def read_split(index: Path, split: str) -> Samples:
     -------
     The samples, in memory.
     """
-    return joined_samples(list(_batches(listed_shards(index, [split]))))
+    return join_samples(list(_batches(listed_shards(index, [split]))))
 
 
 def _batches(shards: Iterable[Path]) -> Iterator[Samples]:

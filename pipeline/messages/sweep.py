@@ -10,7 +10,7 @@ from pipeline.config import RunConfig
 from pipeline.config.learning import NetworkConfig
 from pipeline.messages.training import epoch_message
 from pipeline.network.baselines import mean_predictor_mae
-from pipeline.network.family import VARIANTS, Member, MemberFigures, chosen_member
+from pipeline.network.family import VARIANTS, Member, MemberFigures, choose_member
 from pipeline.network.samples import Samples
 from pipeline.network.training import TrainedNetwork
 from schemas.softgrip.v1.training_pb2 import SweepBudget, SweepNetwork
@@ -49,7 +49,7 @@ def mark_networks(networks: list[SweepNetwork], of_run: NetworkConfig) -> None:
         size = (network.layers, tuple(network.channels))
         network.of_run = size == (of_run.layers, of_run.channels)
     family = [network for network in networks if network.group == "family"]
-    chosen = chosen_member(
+    chosen = choose_member(
         [network.val_mae for network in family],
         [network.val_mae_spread for network in family],
         [network.multiply_adds for network in family],

@@ -110,7 +110,7 @@ class ControlPredictor:
             ).numpy()
 
 
-def checked_against(
+def check_export(
     predictor: ControlPredictor,
     network: GaCnn,
     cloud: Float[np.ndarray, "n h w 3"],

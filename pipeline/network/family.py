@@ -101,7 +101,7 @@ class MemberFigures:
     multiply_adds: int
 
 
-def members(sweep: SweepConfig, of_run: NetworkConfig, seed: int) -> list[Member]:
+def list_members(sweep: SweepConfig, of_run: NetworkConfig, seed: int) -> list[Member]:
     """The members to train: the family, by channel set and then depth, then the ablation.
 
     Parameters
@@ -144,7 +144,7 @@ def members(sweep: SweepConfig, of_run: NetworkConfig, seed: int) -> list[Member
     return [*family, *ablation]
 
 
-def budgeted(sweep: SweepConfig, split: str, samples: Samples) -> Samples:
+def take_budget(sweep: SweepConfig, split: str, samples: Samples) -> Samples:
     """The samples of a split ("train", "val" or "test") that every member gets: the first ones.
 
     A split is shuffled, so that its first samples represent it.
@@ -233,7 +233,7 @@ def standard_error(errors: Float[np.ndarray, " n"]) -> float:
     return float(errors.std(dtype=np.float64) / np.sqrt(len(errors)))
 
 
-def chosen_member(
+def choose_member(
     val_mae: Sequence[float], val_mae_spread: Sequence[float], cost: Sequence[int]
 ) -> int:
     """Index of the cheapest whose validation error is within one standard error of the lowest."""

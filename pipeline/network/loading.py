@@ -125,7 +125,7 @@ def load_batches(
     )
 
 
-class Waiting:
+class WaitClock:
     """Seconds that a loop waits for its items, and seconds that it works on them."""
 
     def __init__(self) -> None:

@@ -50,7 +50,7 @@ ALONE = Ranks()
 
 
 @contextmanager
-def joined_ranks() -> Iterator[Ranks]:
+def join_ranks() -> Iterator[Ranks]:
     """Join the processes that torchrun started with this one; `ALONE` without torchrun."""
     count = int(os.environ.get("WORLD_SIZE", "1"))
     if count == 1:
@@ -113,7 +113,7 @@ class SyncedBatchNorm(nn.BatchNorm2d):
         return normalised
 
 
-def with_synced_norms(module: nn.Module) -> None:
+def sync_batch_norms(module: nn.Module) -> None:
     """Replace every batch normalisation of a network by `SyncedBatchNorm`, weights kept."""
     for name, child in module.named_children():
         if isinstance(child, nn.BatchNorm2d):
@@ -122,4 +122,4 @@ def with_synced_norms(module: nn.Module) -> None:
             synced.load_state_dict(child.state_dict())
             setattr(module, name, synced)
         else:
-            with_synced_norms(child)
+            sync_batch_norms(child)

@@ -45,7 +45,7 @@ class EpochMetrics:
 
 
 @dataclass
-class Standing:
+class TrainingState:
     """How far a training has come.
 
     Attributes
@@ -66,8 +66,8 @@ class Standing:
     sums: Float[Tensor, " 3"]
 
 
-def save_standing(
-    path: Path, identity: str, model: GaCnn, optimizer: torch.optim.AdamW, standing: Standing
+def save_training_state(
+    path: Path, identity: str, model: GaCnn, optimizer: torch.optim.AdamW, state: TrainingState
 ) -> None:
     """Save all that the next batch needs; schedule and generators follow from its number.
 
@@ -81,26 +81,26 @@ def save_standing(
         The network as it is now.
     optimizer
         Its optimizer.
-    standing
+    state
         How far the training has come.
     """
     tensors = {f"model/{name}": tensor for name, tensor in model.state_dict().items()}
-    tensors |= {f"best/{name}": tensor for name, tensor in standing.best_weights.items()}
-    tensors["sums"] = standing.sums
+    tensors |= {f"best/{name}": tensor for name, tensor in state.best_weights.items()}
+    tensors["sums"] = state.sums
     for name, parameter in model.named_parameters():
         for key, tensor in optimizer.state[parameter].items():
             tensors[f"optimizer/{name}/{key}"] = tensor
     metadata = {
         "identity": identity,
-        "history": json.dumps([asdict(past) for past in standing.history]),
-        "batch": str(standing.batch),
+        "history": json.dumps([asdict(past) for past in state.history]),
+        "batch": str(state.batch),
     }
     publish_bytes(path, tensors_to_bytes(tensors, metadata))
 
 
-def load_standing(
-    path: Path, identity: str, model: GaCnn, optimizer: torch.optim.AdamW, fresh: Standing
-) -> Standing:
+def load_training_state(
+    path: Path, identity: str, model: GaCnn, optimizer: torch.optim.AdamW, fresh: TrainingState
+) -> TrainingState:
     """Load a saved state into network and optimizer.
 
     Parameters
@@ -129,7 +129,7 @@ def load_standing(
     if metadata.get("identity") != identity:
         return fresh
     try:
-        standing = Standing(
+        state = TrainingState(
             history=[EpochMetrics(**past) for past in json.loads(metadata["history"])],
             best_weights={
                 name: torch.zeros_like(given).copy_(tensors[f"best/{name}"])
@@ -151,4 +151,4 @@ def load_standing(
         raise ArtifactError(
             f"{path} cannot be continued: {error}", "Delete it to train from the start."
         ) from error
-    return standing
+    return state

@@ -121,7 +121,7 @@ class Samples:
         return Samples(*(getattr(self, f.name)[chosen] for f in fields(self)))
 
 
-def joined_samples(parts: list[Samples]) -> Samples:
+def join_samples(parts: list[Samples]) -> Samples:
     """Join several sets, in order; at least one."""
     return Samples(
         *(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(Samples))

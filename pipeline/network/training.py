@@ -31,19 +31,19 @@ from pipeline.network.canonical import CHANNELS, SYMMETRIES, apply_symmetry, net
 from pipeline.network.ga_cnn import GaCnn, build_network
 from pipeline.network.loading import (
     RawBatch,
-    Waiting,
+    WaitClock,
     batch_count,
     epoch_batches,
     load_batches,
     part_of_rank,
 )
-from pipeline.network.parallel import ALONE, Ranks, with_synced_norms
+from pipeline.network.parallel import ALONE, Ranks, sync_batch_norms
 from pipeline.network.resuming import (
     STATE_FILE,
     EpochMetrics,
-    Standing,
-    load_standing,
-    save_standing,
+    TrainingState,
+    load_training_state,
+    save_training_state,
 )
 from pipeline.network.samples import GraspTensors
 from pipeline.progress import progress
@@ -141,30 +141,30 @@ def train(
     ArtifactError
         The resume state is damaged.
     """
-    device = chosen_device(config.device, ranks)
+    device = choose_device(config.device, ranks)
     identity = _identity(config, network, seed, train_set, val_set, device)
     with reproducible(config.threads):
         model = build_network(network, seed).to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
         if ranks.count > 1:
-            with_synced_norms(model)
+            sync_batch_norms(model)
         optimizer = build_optimizer(model, config)
-        standing = Standing([], _copied_weights(model), 0, _no_sums(device))
+        state = TrainingState([], _copied_weights(model), 0, _no_sums(device))
         state_path = state_dir / STATE_FILE
         if state_path.exists():
-            standing = load_standing(state_path, identity, model, optimizer, standing)
+            state = load_training_state(state_path, identity, model, optimizer, state)
         forward: nn.Module = model
         if ranks.count > 1:
             forward = DistributedDataParallel(model, forward_sync_buffers=False)
 
         batches_per_epoch = batch_count(len(train_set), config.batch_size)
         total_steps = config.epochs * batches_per_epoch
-        reading, preparing, saved_at = Waiting(), Waiting(), time.monotonic()
-        while not _finished(standing.history, config):
-            epoch = len(standing.history)
+        reading, preparing, saved_at = WaitClock(), WaitClock(), time.monotonic()
+        while not _finished(state.history, config):
+            epoch = len(state.history)
             rng = np.random.default_rng((seed, epoch))
             batches = epoch_batches(len(train_set), config.batch_size, rng)
             symmetry = rng.integers(0, SYMMETRIES, len(train_set)) if config.augment else None
-            mine = part_of_rank(batches, ranks.rank, ranks.count)[standing.batch :]
+            mine = part_of_rank(batches, ranks.rank, ranks.count)[state.batch :]
             loaded = load_batches(train_set, mine, loader_workers, pinned=device.type == "cuda")
             ready = preparing.watch(ready_batches(reading.watch(loaded), symmetry, device))
             if show_progress and ranks.first:
@@ -173,7 +173,7 @@ def train(
 
             model.train()
             for inputs, quality in ready:
-                step = epoch * batches_per_epoch + standing.batch
+                step = epoch * batches_per_epoch + state.batch
                 rate = learning_rate_at(step, total_steps, config)
                 for group in optimizer.param_groups:
                     group["lr"] = rate
@@ -185,17 +185,17 @@ def train(
                 )
                 optimizer.zero_grad(set_to_none=True)
                 # Processes average their gradients: that of the batch's mean is what comes out.
-                (loss * ranks.count / len(batches[standing.batch])).backward()
+                (loss * ranks.count / len(batches[state.batch])).backward()
                 nn.utils.clip_grad_norm_(model.parameters(), config.gradient_norm_max)
                 optimizer.step()
 
-                standing.sums += ranks.summed(_sums(loss, predicted, quality))
-                standing.batch += 1
+                state.sums += ranks.summed(_sums(loss, predicted, quality))
+                state.batch += 1
                 if ranks.first and time.monotonic() - saved_at >= save_every_s:
-                    save_standing(state_path, identity, model, optimizer, standing)
+                    save_training_state(state_path, identity, model, optimizer, state)
                     saved_at = time.monotonic()
 
-            loss_sum, error_sum, seen = standing.sums.tolist()
+            loss_sum, error_sum, seen = state.sums.tolist()
             metrics = EpochMetrics(
                 epoch=epoch,
                 learning_rate=learning_rate_at(
@@ -206,24 +206,24 @@ def train(
                 val_mae=_mean_absolute_error(model, val_set, config.batch_size, device, ranks),
                 samples=round(seen),
             )
-            if metrics.val_mae < min((past.val_mae for past in standing.history), default=math.inf):
-                standing.best_weights = _copied_weights(model)
-            standing.history.append(metrics)
-            standing.batch, standing.sums = 0, _no_sums(device)
+            if metrics.val_mae < min((past.val_mae for past in state.history), default=math.inf):
+                state.best_weights = _copied_weights(model)
+            state.history.append(metrics)
+            state.batch, state.sums = 0, _no_sums(device)
             if ranks.first:
-                save_standing(state_path, identity, model, optimizer, standing)
+                save_training_state(state_path, identity, model, optimizer, state)
                 saved_at = time.monotonic()
                 on_epoch(metrics)
 
-    best = min(standing.history, key=lambda metrics: metrics.val_mae)
+    best = min(state.history, key=lambda metrics: metrics.val_mae)
     trained = build_network(network, seed)
-    trained.load_state_dict(standing.best_weights)
+    trained.load_state_dict(state.best_weights)
     return TrainedNetwork(
         network=trained.eval(),
         best_epoch=best.epoch,
         val_mae=best.val_mae,
-        history=tuple(standing.history),
-        stopped_early=len(standing.history) < config.epochs,
+        history=tuple(state.history),
+        stopped_early=len(state.history) < config.epochs,
         waiting_share=preparing.share_of(reading.waiting_s),
         preparing_share=preparing.share_of(preparing.waiting_s - reading.waiting_s),
     )
@@ -276,7 +276,7 @@ def build_optimizer(model: GaCnn, config: TrainConfig) -> torch.optim.AdamW:
     return torch.optim.AdamW(groups, lr=config.learning_rate, fused=True)
 
 
-def chosen_device(wanted: str, ranks: Ranks) -> torch.device:
+def choose_device(wanted: str, ranks: Ranks) -> torch.device:
     """The device to train on: the GPU of this process's number, or the CPU.
 
     Parameters

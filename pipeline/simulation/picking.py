@@ -163,20 +163,20 @@ def run_clutter(
     clutter = Clutter(scene, objects, config, rng)
     strategy = strategy_of(policy, predict, config)
     attempts: list[Made] = []
-    spoilt_m: list[Float[np.ndarray, " 3"]] = []
+    failed_contacts_m: list[Float[np.ndarray, " 3"]] = []
     in_a_row = 0
     while (
         clutter.bodies
         and len(attempts) < config.evaluate.attempts_per_clutter
         and in_a_row < config.evaluate.failures_per_clutter
     ):
-        made = clutter.attempted(strategy, spoilt_m)
+        made = clutter.attempted(strategy, failed_contacts_m)
         attempts.append(made)
         # What did not hold once is tried again only where nothing else is left.
-        spoilt_m += made.decision.spoilt_m
+        failed_contacts_m += made.decision.failed_contacts_m
         if made.cause is Cause.LIFTED:
             in_a_row = 0
         else:
             in_a_row += 1
-            spoilt_m.append(made.decision.world_from_contact[:3, 3])
+            failed_contacts_m.append(made.decision.world_from_contact[:3, 3])
     return attempts

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.artifacts import ArtifactWriter, Input, Provenance, file_sha256
-from pipeline.artifacts.inspection import contents_of, verified
+from pipeline.artifacts.inspection import read_contents, verify_files
 from pipeline.artifacts.sharding import shard_entry, shard_path, write_index
 from schemas.softgrip.v1.objects_pb2 import CatalogueObject
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
@@ -44,16 +44,16 @@ def run(tmp_path: Path, provenance: Provenance) -> Path:
 
 
 def problems(run: Path, name: str = "grasps.mcap") -> dict[str, str]:
-    found = verified(run / name, run / "meshes")
+    found = verify_files(run / name, run / "meshes")
     return {f.path.name: f.problem for f in found if f.problem}
 
 
 def test_contents_are_told(run: Path, provenance: Provenance) -> None:
-    objects = contents_of(run / "objects.mcap")
+    objects = read_contents(run / "objects.mcap")
     assert objects.counts == {"/objects": ("softgrip.v1.CatalogueObject", 1)}
     assert objects.attachments == {"note.txt": 5}
     assert objects.provenance.seed == provenance.seed
-    index = contents_of(run / "grasps.mcap")
+    index = read_contents(run / "grasps.mcap")
     assert index.shards == {
         "grasps/00000-of-00002.mcap": 5,
         "grasps/00001-of-00002.mcap": 5,
@@ -61,7 +61,7 @@ def test_contents_are_told(run: Path, provenance: Provenance) -> None:
 
 
 def test_a_whole_chain_is_followed_to_the_mesh_each_file_once(run: Path) -> None:
-    found = [f.path.name for f in verified(run / "grasps.mcap", run / "meshes")]
+    found = [f.path.name for f in verify_files(run / "grasps.mcap", run / "meshes")]
     assert problems(run) == {}
     shards = {f"{index:05d}-of-00002.mcap" for index in range(2)}
     assert set(found) == {"grasps.mcap", "objects.mcap", "cube.ply", *shards}
@@ -91,7 +91,7 @@ def test_what_is_missing_is_found(run: Path) -> None:
 
 
 def test_meshes_are_said_to_be_not_compared_where_their_folder_is_unknown(run: Path) -> None:
-    found = [f for f in verified(run / "objects.mcap", None) if f.problem]
+    found = [f for f in verify_files(run / "objects.mcap", None) if f.problem]
     assert [f.path.name for f in found] == ["cube.ply"]
     assert "--mesh-dir" in found[0].problem
 
@@ -106,7 +106,7 @@ def test_names_in_a_record_do_not_lead_out_of_the_folder(run: Path, provenance: 
     )
     with ArtifactWriter(run / "bad.mcap", replace(provenance, inputs=outside)) as artifact:
         artifact.write("/objects", CatalogueObject(), log_time_ns=0)
-    found = [f for f in verified(run / "bad.mcap", run / "meshes") if f.problem]
+    found = [f for f in verify_files(run / "bad.mcap", run / "meshes") if f.problem]
     assert len(found) == len(outside)
     assert all("leads out of" in f.problem for f in found)
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pipeline.artifacts import from_tensor, open_artifact
-from pipeline.artifacts.inspection import verified
+from pipeline.artifacts.inspection import verify_files
 from pipeline.artifacts.sharding import listed_shards, read_index
 from pipeline.messages.grasps import grasps_of
 from pipeline.messages.objects import read_objects
@@ -17,7 +17,7 @@ from pipeline.messages.samples import samples_of
 from pipeline.messages.scenes import read_scenes
 from pipeline.messages.training import CHECKPOINT, EXPORT
 from pipeline.network.checkpoint import load_checkpoint_bytes
-from pipeline.network.control_inference import ControlPredictor, checked_against
+from pipeline.network.control_inference import ControlPredictor, check_export
 from pipeline.network.inference import predict
 from schemas.compatibility import read_released, versions
 from schemas.softgrip.v1.evaluation_pb2 import Attempt, LevelResult
@@ -92,7 +92,7 @@ def test_training(released: Path) -> None:
     # Checkpoint and export agree, and on the samples they were tested on they predict what their
     # run wrote down, which was a mean over the eight symmetries.
     cloud, mask = samples.cloud.copy(), samples.cloud_mask.copy()
-    checked_against(predictor, network, cloud, mask, batch_size=64, threads=1)
+    check_export(predictor, network, cloud, mask, batch_size=64, threads=1)
     averaged = predict(network, cloud, mask, 64, 1, average_symmetries=True)
     written = from_tensor(result.test_prediction)[: len(samples)]
     np.testing.assert_allclose(averaged, written, atol=1e-4)
@@ -110,7 +110,7 @@ def test_evaluation(released: Path) -> None:
 def test_the_chain_holds_and_typescript_reads_it(released: Path) -> None:
     files = sorted(released.rglob("*.mcap"))
     assert by_node(files) == [by_us(path) for path in files]
-    assert [f for f in verified(released / "evaluate.mcap", None) if f.problem] == []
+    assert [f for f in verify_files(released / "evaluate.mcap", None) if f.problem] == []
 
 
 def test_every_message_of_its_schema_is_in_a_sample(released: Path) -> None:

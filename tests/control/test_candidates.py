@@ -6,7 +6,7 @@ from pipeline.config import EvaluateConfig
 from pipeline.control.candidates import Candidates, candidates_at, sample_near
 from pipeline.control.clearance import free_of_collision
 from pipeline.control.cloud import Cloud, merged_cloud
-from pipeline.control.ranking import GeometricRanking, smoothed
+from pipeline.control.ranking import GeometricRanking, smooth_quality
 from pipeline.labelling.sampling import contact_frames
 from tests.control.fakes import picture_of
 from tests.control.test_policy import plate
@@ -90,5 +90,5 @@ def test_smoothing_prefers_a_region_to_a_lucky_point() -> None:
     found = Candidates(contact_frames(places, up, np.zeros(10)), np.zeros(10))
     quality = np.array([0.5, 0.5, 0.9, 0.5, 0.5, 0.8, 0.8, 0.8, 0.8, 0.8])
     assert np.argmax(quality) == 2
-    assert np.argmax(smoothed(found, quality, 0.007, 0.3)) >= 5
-    np.testing.assert_array_equal(smoothed(found, quality, 0.0, 0.3), quality)
+    assert np.argmax(smooth_quality(found, quality, 0.007, 0.3)) >= 5
+    np.testing.assert_array_equal(smooth_quality(found, quality, 0.0, 0.3), quality)

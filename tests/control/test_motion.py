@@ -27,7 +27,7 @@ def watched(velocity_m_s: np.ndarray, periods: int, noise_m: float, seed: int) -
     for period in range(periods):
         passed_m = velocity_m_s * period * PERIOD_S
         motion.see(box(AIM_M + passed_m, rng, noise_m), AIM_M + passed_m)
-        motion.passed()
+        motion.count_period()
     return motion
 
 
@@ -53,7 +53,7 @@ def test_it_follows_far_beyond_the_first_picture() -> None:
 def test_nothing_seen_is_nothing_known() -> None:
     motion = Motion(PERIOD_S, SEEN_M, MotionConfig())
     motion.see(np.empty((0, 3)), AIM_M)
-    motion.passed()
+    motion.count_period()
     motion.see(np.empty((0, 3)), AIM_M)
     assert not motion.velocity_m_s.any()
 
@@ -65,7 +65,7 @@ def test_an_even_surface_without_end_tells_nothing() -> None:
         plate = rng.uniform(-0.15, 0.15, (30_000, 3))
         plate[:, 2] = 0.04 + rng.normal(0.0, 0.001, len(plate))
         motion.see(plate, AIM_M)
-        motion.passed()
+        motion.count_period()
         assert not motion.velocity_m_s.any()
 
 
@@ -79,5 +79,5 @@ def test_a_look_that_wanders_is_no_motion() -> None:
         aim = AIM_M + np.array([aside_m, 0.0, 0.0])
         cut = plate[np.linalg.norm(plate[:, :2] - aim[:2], axis=1) < SEEN_M + 0.005]
         motion.see(cut, aim)
-        motion.passed()
+        motion.count_period()
         assert np.linalg.norm(motion.velocity_m_s) == 0.0

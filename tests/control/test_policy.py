@@ -268,16 +268,16 @@ def test_where_nothing_holds_another_place_is_grasped_in_the_same_attempt() -> N
     robot = LeakyRobot(TOP_M)
     decision, eyes = tried(plate(), robot)
     assert decision.cause is Cause.LIFTED
-    assert decision.regrasps == len(decision.spoilt_m) == 1
+    assert decision.regrasps == len(decision.failed_contacts_m) == 1
     assert eyes.static_looks == 1
-    np.testing.assert_allclose(decision.spoilt_m[0][:2], robot.sealed_at[0][:2], atol=2e-3)
+    np.testing.assert_allclose(decision.failed_contacts_m[0][:2], robot.sealed_at[0][:2], atol=2e-3)
 
 
 def test_every_place_that_did_not_hold_is_told() -> None:
     robot = FakeRobot(TOP_M, State.SEAL)
     decision, _ = tried(plate(), robot)
     assert decision.cause is Cause.NO_SEAL
-    assert len(decision.spoilt_m) == 1 + decision.regrasps == 1 + CONFIG.policy.regrasps
+    assert len(decision.failed_contacts_m) == 1 + decision.regrasps == 1 + CONFIG.policy.regrasps
 
 
 @pytest.mark.parametrize(("least", "regrasps"), [(0.0, CONFIG.policy.regrasps), (0.1, 0)])

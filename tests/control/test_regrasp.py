@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from pipeline.config import PolicyConfig
 from pipeline.control.candidates import Candidates
 from pipeline.control.cloud import Cloud
-from pipeline.control.regrasp import hangs_below_m, top_of_column_m, worth_with_lever
+from pipeline.control.regrasp import load_place_m, top_of_column_m, worth_with_lever
 from pipeline.control.robot import Reading
 
 BASE_M = 0.2
@@ -28,7 +28,7 @@ def test_the_weight_is_found_below_its_centre_however_the_gripper_leans(
     base = (pose @ [0.0, 0.0, BASE_M, 1.0])[:3]
     into_gripper = pose[:3, :3].T
     wrench = np.concatenate([into_gripper @ weight, into_gripper @ np.cross(centre - base, weight)])
-    found = hangs_below_m(Reading(pose, wrench, 0.0, arrived=True), BASE_M)
+    found = load_place_m(Reading(pose, wrench, 0.0, arrived=True), BASE_M)
     assert_allclose(found, centre[:2], atol=1e-9)
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from pipeline.config.policy import PolicyConfig
 from pipeline.control.robot import Reading
-from pipeline.control.wrench_monitor import Event, WrenchMonitor, line_of_load, trimmed
+from pipeline.control.wrench_monitor import Event, WrenchMonitor, line_of_load, trim_pose
 
 CONFIG = PolicyConfig()
 WEIGHT = np.array([0.0, 0.0, -2.0])
@@ -57,7 +57,7 @@ def test_trimming_lessens_the_moment_at_the_base(aside_m: float) -> None:
         force = pose[:3, :3].T @ WEIGHT
         wrench = np.concatenate([force, np.cross(hangs_at, force)])
         sizes.append(float(np.linalg.norm(wrench[3:])))
-        pose, turned = trimmed(pose, wrench, left, CONFIG)
+        pose, turned = trim_pose(pose, wrench, left, CONFIG)
         left -= turned
     assert sizes[-1] < 0.35 * sizes[0]
     assert (np.diff(sizes) <= 1e-12).all()
@@ -65,6 +65,6 @@ def test_trimming_lessens_the_moment_at_the_base(aside_m: float) -> None:
 
 def test_trimming_stays_within_its_bound() -> None:
     wrench = np.array([0, 0, -2.0, 0.3, 0.0, 0.0])
-    pose, turned = trimmed(np.eye(4), wrench, 0.01, CONFIG)
+    pose, turned = trim_pose(np.eye(4), wrench, 0.01, CONFIG)
     assert turned == pytest.approx(0.01)
     assert np.arccos(pose[2, 2]) == pytest.approx(0.01, abs=1e-6)

@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.execution import code
-from pipeline.execution.code import code_digests, reached
+from pipeline.execution.code import code_digests, reached_modules
 from stages.graph import MADE
 
 LIMITS = '''"""Limits of the pad."""
@@ -154,5 +154,5 @@ def test_a_stage_reaches_itself_and_nothing_that_draws_or_only_runs(name: str) -
     module = MADE[name].module
     assert f"{module.replace('.', '/')}.py" in code_digests(module)
     assert not any(path.startswith("pipeline/recording") for path in code_digests(module))
-    assert not set(code.RUNNING) & set(reached(module))
+    assert not set(code.RUNNING) & set(reached_modules(module))
     assert all(code_digests(running, without=()) for running in code.RUNNING)

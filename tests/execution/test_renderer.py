@@ -12,7 +12,7 @@ import pytest
 from pipeline.errors import MachineError
 from pipeline.execution import renderer
 from pipeline.execution.code import ROOT
-from pipeline.execution.renderer import EMBREE, told_renderer
+from pipeline.execution.renderer import EMBREE, identify_renderer
 
 CHOSEN = """
 from pipeline.sensing.rendering import new_renderer
@@ -29,7 +29,7 @@ def chosen_by_auto() -> str:
 
 
 def test_what_is_told_is_what_auto_takes(tmp_path: Path) -> None:
-    told = told_renderer("auto", tmp_path / "memo.json")
+    told = identify_renderer("auto", tmp_path / "memo.json")
     assert chosen_by_auto() == ("embree" if told == EMBREE else "sapien")
     if told != EMBREE:
         assert told.startswith("SAPIEN ")
@@ -43,10 +43,10 @@ def test_without_a_driver_it_is_embree_and_sapien_by_name_is_refused(
     none.write_text(json.dumps({"ICD": {"library_path": "/no/lib.so", "api_version": "1.3.0"}}))
     monkeypatch.setenv("VK_ICD_FILENAMES", str(none))
     monkeypatch.setenv("VK_DRIVER_FILES", str(none))
-    assert told_renderer("auto", tmp_path / "memo.json") == EMBREE
+    assert identify_renderer("auto", tmp_path / "memo.json") == EMBREE
     assert chosen_by_auto() == "embree"
     with pytest.raises(MachineError, match="no Vulkan driver"):
-        told_renderer("sapien", tmp_path / "memo.json")
+        identify_renderer("sapien", tmp_path / "memo.json")
 
 
 class Trial:
@@ -82,24 +82,24 @@ def test_it_is_tried_once_until_the_driver_changes(
 ) -> None:
     memo = tmp_path / "memo.json"
     for _ in range(3):
-        assert told_renderer("auto", memo) == "SAPIEN with driver 1"
+        assert identify_renderer("auto", memo) == "SAPIEN with driver 1"
     assert trial.asked == 1
     driver.write_text("driver 10")
-    assert told_renderer("auto", memo) == "SAPIEN with driver 10"
+    assert identify_renderer("auto", memo) == "SAPIEN with driver 10"
     memo.write_text("{broken")
-    assert told_renderer("auto", memo) == "SAPIEN with driver 10"
+    assert identify_renderer("auto", memo) == "SAPIEN with driver 10"
     assert trial.asked == 3
 
 
 def test_another_choice_of_the_user_is_tried_anew(
     tmp_path: Path, trial: Trial, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    told_renderer("auto", tmp_path / "memo.json")
+    identify_renderer("auto", tmp_path / "memo.json")
     monkeypatch.setitem(os.environ, "VK_ICD_FILENAMES", "/another.json")
-    told_renderer("auto", tmp_path / "memo.json")
+    identify_renderer("auto", tmp_path / "memo.json")
     assert trial.asked == 2
 
 
 def test_embree_asks_nobody(tmp_path: Path, trial: Trial) -> None:
-    assert told_renderer("embree", tmp_path / "memo.json") == EMBREE
+    assert identify_renderer("embree", tmp_path / "memo.json") == EMBREE
     assert trial.asked == 0

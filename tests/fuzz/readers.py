@@ -18,7 +18,7 @@ from mcap_protobuf.schema import register_schema
 
 from pipeline.artifacts import ArtifactWriter, Provenance, from_tensor, open_artifact, to_tensor
 from pipeline.artifacts.bounds import FOOTER, MAGIC
-from pipeline.artifacts.inspection import contents_of, verified
+from pipeline.artifacts.inspection import read_contents, verify_files
 from pipeline.config import ObjectsConfig, load_run_config
 from pipeline.errors import SoftgripError
 from pipeline.geometry.mesh_files import load_mesh_file
@@ -81,8 +81,8 @@ def read_mcap(data: bytes) -> None:
             write_raw_message(path, MESSAGES[way - 2], data)
         else:
             path.write_bytes(with_index_checksum(data) if way == 1 else data)
-            list(verified(path, None))
-            contents_of(path)
+            list(verify_files(path, None))
+            read_contents(path)
         with open_artifact(path) as artifact:
             for _, message in artifact.messages(CatalogueObject):
                 object_of(message)

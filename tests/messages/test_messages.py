@@ -25,7 +25,7 @@ from pipeline.messages.grasps import (
     pads_of,
 )
 from pipeline.messages.samples import sample_batch, samples_of
-from pipeline.network.samples import Samples, joined_samples
+from pipeline.network.samples import Samples, join_samples
 from schemas.softgrip.v1.grasps_pb2 import DrapedPads, GraspBatch, ShardEntry
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 from tests.checked_shapes import unchecked
@@ -99,7 +99,7 @@ def test_samples_round_trip_and_join() -> None:
         samples_of(SampleBatch.FromString(sample_batch(p, ("a",)).SerializeToString()))
         for p in parts
     ]
-    back = joined_samples(wired)
+    back = join_samples(wired)
     for field in fields(samples):
         np.testing.assert_array_equal(getattr(back, field.name), getattr(samples, field.name))
 

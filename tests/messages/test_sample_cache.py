@@ -12,7 +12,7 @@ from pipeline.artifacts.sharding import shard_entry, shard_path, write_index
 from pipeline.errors import ArtifactError
 from pipeline.messages.sample_cache import cached_split
 from pipeline.messages.samples import sample_batch
-from pipeline.network.samples import Samples, joined_samples
+from pipeline.network.samples import Samples, join_samples
 
 
 def some_samples(count: int, seed: int) -> Samples:
@@ -54,7 +54,7 @@ def test_mapped_samples_are_those_of_the_shards_in_order(
 ) -> None:
     index = sharded(tmp_path, provenance, PARTS)
     mapped = cached_split(index, "train", tmp_path / "cache")
-    whole = joined_samples(PARTS)
+    whole = join_samples(PARTS)
     for field in fields(Samples):
         found = getattr(mapped, field.name)
         assert isinstance(found, np.memmap)
@@ -86,7 +86,7 @@ def test_a_kill_while_decoding_leaves_nothing_that_passes_for_whole(
     left.mkdir(parents=True)
     (left / "cloud.npy").write_bytes(b"half")
     mapped = cached_split(index, "train", cache)
-    np.testing.assert_array_equal(mapped.cloud, joined_samples(PARTS).cloud)
+    np.testing.assert_array_equal(mapped.cloud, join_samples(PARTS).cloud)
     assert not list(cache.glob(".*.part"))
 
 
@@ -109,7 +109,7 @@ def test_an_interrupt_leaves_nothing_half(
             cached_split(index, "train", cache)
     assert not list(cache.glob(".*.part"))
     np.testing.assert_array_equal(
-        cached_split(index, "train", cache).cloud, joined_samples(PARTS).cloud
+        cached_split(index, "train", cache).cloud, join_samples(PARTS).cloud
     )
 
 

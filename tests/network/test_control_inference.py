@@ -13,7 +13,7 @@ import torch
 from pipeline.errors import ArtifactError, ContentError
 from pipeline.execution import run_in_order
 from pipeline.network.canonical import CHANNELS, network_input
-from pipeline.network.control_inference import ControlPredictor, checked_against
+from pipeline.network.control_inference import ControlPredictor, check_export
 from pipeline.network.ga_cnn import GaCnn, build_network
 from tests.network.planes import planes_with_holes
 from tests.network.test_hostile_checkpoints import model, node
@@ -37,7 +37,7 @@ def test_it_predicts_what_the_network_predicts(
     network: GaCnn, data: bytes, batch_size: int
 ) -> None:
     predictor = ControlPredictor(data, threads=1)
-    difference = checked_against(predictor, network, SAMPLES.cloud, SAMPLES.mask, batch_size, 1)
+    difference = check_export(predictor, network, SAMPLES.cloud, SAMPLES.mask, batch_size, 1)
     assert difference <= 1e-4
 
 
@@ -52,7 +52,7 @@ def test_another_runtime_predicts_the_same(data: bytes, whole: np.ndarray) -> No
 def test_another_network_is_told_apart(network: GaCnn, data: bytes) -> None:
     other = lively(build_network(network.config, seed=9))
     with pytest.raises(ArtifactError, match="differs from its original"):
-        checked_against(ControlPredictor(data, 1), other, SAMPLES.cloud, SAMPLES.mask, 30, 1)
+        check_export(ControlPredictor(data, 1), other, SAMPLES.cloud, SAMPLES.mask, 30, 1)
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])

@@ -8,8 +8,8 @@ from pipeline.errors import ConfigError
 from pipeline.network.canonical import CHANNELS
 from pipeline.network.family import (
     VARIANTS,
-    chosen_member,
-    members,
+    choose_member,
+    list_members,
     multiply_adds,
     standard_error,
 )
@@ -19,7 +19,7 @@ OF_RUN = NetworkConfig(layers=52, channels=(64, 128, 256, 512))
 
 
 def test_the_published_comparison_has_over_50_networks_of_18_to_102_layers() -> None:
-    family = members(SweepConfig(ablation_seeds=0), OF_RUN, seed=0)
+    family = list_members(SweepConfig(ablation_seeds=0), OF_RUN, seed=0)
     assert len(family) > 50
     assert len({m.name for m in family}) == len(family)
     depths = {m.network.layers for m in family}
@@ -31,7 +31,7 @@ def test_the_published_comparison_has_over_50_networks_of_18_to_102_layers() -> 
 
 def test_ablation_leaves_out_one_part_at_a_time() -> None:
     config = SweepConfig(depths=(18,), channels=((8, 8, 8, 8),), ablation_seeds=2)
-    ablation = [m for m in members(config, OF_RUN, seed=5) if m.group == "ablation"]
+    ablation = [m for m in list_members(config, OF_RUN, seed=5) if m.group == "ablation"]
     assert [m.variant for m in ablation] == [*VARIANTS, *VARIANTS]
     assert [m.seed for m in ablation] == [5, 5, 5, 6, 6, 6]
     whole, no_attention, no_augmentation = ablation[:3]
@@ -42,7 +42,7 @@ def test_ablation_leaves_out_one_part_at_a_time() -> None:
 
 def test_a_depth_that_no_member_has_is_refused_before_any_training() -> None:
     with pytest.raises(ConfigError, match="19"):
-        members(SweepConfig(depths=(18, 19)), OF_RUN, seed=0)
+        list_members(SweepConfig(depths=(18, 19)), OF_RUN, seed=0)
 
 
 def test_multiply_adds_are_those_of_the_layers_sizes() -> None:
@@ -60,9 +60,9 @@ def test_multiply_adds_are_those_of_the_layers_sizes() -> None:
 
 def test_the_cheapest_within_one_standard_error_is_chosen() -> None:
     errors, spread = [0.10, 0.051, 0.050, 0.052], [0.01, 0.002, 0.0015, 0.002]
-    assert chosen_member(errors, spread, cost=[1, 5, 9, 7]) == 1
-    assert chosen_member(errors, [0.0] * 4, cost=[1, 5, 9, 7]) == 2
-    assert chosen_member(errors, [0.1] * 4, cost=[1, 5, 9, 7]) == 0
+    assert choose_member(errors, spread, cost=[1, 5, 9, 7]) == 1
+    assert choose_member(errors, [0.0] * 4, cost=[1, 5, 9, 7]) == 2
+    assert choose_member(errors, [0.1] * 4, cost=[1, 5, 9, 7]) == 0
 
 
 def test_standard_error_shrinks_with_the_root_of_the_count() -> None:

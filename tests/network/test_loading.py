@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from pipeline.errors import ConfigError
 from pipeline.network.loading import (
-    Waiting,
+    WaitClock,
     batch_count,
     epoch_batches,
     load_batches,
@@ -67,7 +67,7 @@ def test_batches_too_small_to_divide_are_refused() -> None:
 
 
 def test_waiting_counts_the_time_before_each_item() -> None:
-    waiting = Waiting()
+    waiting = WaitClock()
     assert waiting.share_of(1.0) is None
     assert list(waiting.watch(range(3))) == [0, 1, 2]
     assert waiting.waiting_s > 0

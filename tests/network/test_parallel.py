@@ -11,7 +11,7 @@ import torch
 from pipeline.config.learning import NetworkConfig
 from pipeline.network.canonical import CHANNELS
 from pipeline.network.ga_cnn import build_network
-from pipeline.network.parallel import ALONE, SyncedBatchNorm, joined_ranks, with_synced_norms
+from pipeline.network.parallel import ALONE, SyncedBatchNorm, join_ranks, sync_batch_norms
 from tests.network.train_in_ranks import SAMPLES, trained_in
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -46,7 +46,7 @@ def test_two_processes_and_their_loaders_give_the_curve_of_one(tmp_path: Path) -
 
 
 def test_without_torchrun_a_process_is_alone() -> None:
-    with joined_ranks() as ranks:
+    with join_ranks() as ranks:
         assert ranks == ALONE
         values = torch.ones(3)
         assert ranks.summed(values) is values
@@ -56,7 +56,7 @@ def test_synced_norms_keep_names_and_weights_and_predict_alike() -> None:
     config = NetworkConfig(layers=18, channels=(16, 16, 32, 32))
     plain, synced = build_network(config, seed=0), build_network(config, seed=0)
     parameters = list(synced.parameters())
-    with_synced_norms(synced)
+    sync_batch_norms(synced)
     assert all(a is b for a, b in zip(parameters, synced.parameters(), strict=True))
     assert list(synced.state_dict()) == list(plain.state_dict())
     norms = [m for m in synced.modules() if isinstance(m, torch.nn.BatchNorm2d)]

@@ -15,7 +15,7 @@ from pipeline.network.baselines import mean_predictor_mae
 from pipeline.network.checkpoint import save_checkpoint_bytes
 from pipeline.network.figures import mean_absolute_error
 from pipeline.network.inference import predict
-from pipeline.network.resuming import STATE_FILE, EpochMetrics, save_standing
+from pipeline.network.resuming import STATE_FILE, EpochMetrics, save_training_state
 from pipeline.network.samples import GraspTensors
 from pipeline.network.training import TrainedNetwork, learning_rate_at, train
 from tests.network.planes import planes_with_holes
@@ -100,14 +100,14 @@ def test_run_killed_within_an_epoch_resumes_to_the_same_bytes(
 
     def save_then_die(*arguments: Any) -> None:
         nonlocal saved
-        save_standing(*arguments)
+        save_training_state(*arguments)
         saved += 1
         if saved == kill_after:
             raise KilledError
 
     # Four batches an epoch, each followed by a state: these kills fall inside one.
     with monkeypatch.context() as patch:
-        patch.setattr(training, "save_standing", save_then_die)
+        patch.setattr(training, "save_training_state", save_then_die)
         with pytest.raises(KilledError):
             train(SHORT, NETWORK, 1, few, few, tmp_path / "killed", print, save_every_s=0.0)
     resumed = short_training(few, tmp_path / "killed", seed=1, kill_after=None)

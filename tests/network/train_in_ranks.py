@@ -14,7 +14,7 @@ import torch
 from torch import nn
 
 from pipeline.config.learning import NetworkConfig, TrainConfig
-from pipeline.network.parallel import Ranks, SyncedBatchNorm, joined_ranks
+from pipeline.network.parallel import Ranks, SyncedBatchNorm, join_ranks
 from pipeline.network.training import TrainedNetwork, train
 from tests.network.planes import planes_with_holes
 
@@ -56,7 +56,7 @@ def norm_difference(ranks: Ranks) -> float:
 
 
 if __name__ == "__main__":
-    with joined_ranks() as together:
+    with join_ranks() as together:
         trained = trained_in(Path(sys.argv[1]), together, loader_workers=1)
         seen = {
             "history": [asdict(metrics) for metrics in trained.history],

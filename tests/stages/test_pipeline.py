@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.artifacts import open_artifact, read_provenance
-from pipeline.artifacts.inspection import verified
+from pipeline.artifacts.inspection import verify_files
 from pipeline.execution import RunFolder
 from pipeline.messages.objects import read_objects
 from pipeline.messages.samples import read_split
@@ -48,7 +48,7 @@ def test_a_second_run_of_any_stage_does_nothing(run: RunFolder) -> None:
 
 
 def test_every_file_is_verified_from_the_last_stage(run: RunFolder) -> None:
-    found = list(verified(run.artifact("evaluate"), None))
+    found = list(verify_files(run.artifact("evaluate"), None))
     assert [f for f in found if f.problem] == []
     assert {f.path.resolve() for f in found} >= {f.resolve() for f in run.path.rglob("*.mcap")}
 

@@ -15,7 +15,7 @@ from rerun.chunk import RrdReader
 from pipeline.artifacts import file_sha256
 from pipeline.execution import RunFolder, StageContext
 from pipeline.execution import running as execution
-from pipeline.execution.code import DRAWING, reached
+from pipeline.execution.code import DRAWING, reached_modules
 from pipeline.execution.freshness import Key
 from pipeline.execution.staleness import is_fresh, stage_context, why_stale
 from stages.graph import STAGES, inputs_of
@@ -133,7 +133,7 @@ def test_of_what_draws_a_stage_uses_its_drawing_alone(stage: str) -> None:
     The table of an evaluation is printed, and written by what draws.
     """
     taken = set()
-    for name in reached(STAGES[stage].module):
+    for name in reached_modules(STAGES[stage].module):
         path = ROOT.joinpath(*name.split("."))
         source = (
             path.with_suffix(".py") if path.with_suffix(".py").is_file() else path / "__init__.py"
