@@ -9,6 +9,8 @@ import os
 import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -19,6 +21,31 @@ Result = TypeVar("Result")
 
 MOST_RETRIES = 5  # of an item whose node died: nodes that die so often are no cluster
 AHEAD_PER_CPU = 2  # items in flight, so that a slow driver bounds memory
+
+
+@dataclass(frozen=True)
+class JobByName:
+    """A job as a node finds it: a function by its name, and what is passed beside the item.
+
+    Attributes
+    ----------
+    module, name
+        Where the function is defined and how it is called there.
+    before
+        Positional arguments that stand before the item.
+    keywords
+        Arguments by keyword.
+    """
+
+    module: str
+    name: str
+    before: tuple[Any, ...] = ()
+    keywords: dict[str, Any] = field(default_factory=dict)
+
+    def __call__(self, item: Any) -> Any:
+        """What the function makes of an item, on the machine where this is called."""
+        function = getattr(importlib.import_module(self.module), self.name)
+        return function(*self.before, item, **self.keywords)
 
 
 def run_on_ray(job: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
@@ -41,10 +68,11 @@ def run_on_ray(job: Callable[[Item], Result], items: Iterable[Item]) -> Iterator
     Raises
     ------
     MachineError
-        Ray is not installed, or no cluster answers.
+        Ray is not installed, no cluster answers, or no node could find the job.
     SoftgripError
         The node of a job died more often than the job is tried again.
     """
+    named = job_by_name(job)
     try:
         import ray
         from ray.exceptions import RayTaskError, WorkerCrashedError
@@ -61,12 +89,12 @@ def run_on_ray(job: Callable[[Item], Result], items: Iterable[Item]) -> Iterator
             f"no Ray cluster answers ({error})", "Start one with 'ray start --head'"
         ) from error
     remote = ray.remote(num_cpus=1, max_retries=MOST_RETRIES)(_run_there)
-    name, there = _importable(job), str(Path.cwd())
+    there = str(Path.cwd())
     ahead = AHEAD_PER_CPU * max(1, int(ray.cluster_resources().get("CPU", 1)))
     waiting: deque[Any] = deque()
     try:
         for item in items:
-            waiting.append(remote.remote(name, there, item))
+            waiting.append(remote.remote(named, there, item))
             if len(waiting) >= ahead:
                 yield ray.get(waiting.popleft())
         while waiting:
@@ -82,23 +110,41 @@ def run_on_ray(job: Callable[[Item], Result], items: Iterable[Item]) -> Iterator
         ray.shutdown()
 
 
-def _run_there(job: tuple[str, str], folder: str, item: Any) -> Any:
-    """On a node: the job by its name, in the folder that relative paths start from."""
-    os.chdir(folder)
-    if folder not in sys.path:
-        sys.path.insert(0, folder)
-    module, name = job
-    return getattr(importlib.import_module(module), name)(item)
+def job_by_name(job: Callable[[Item], Result]) -> JobByName:
+    """The job as any node can find it.
 
+    Parameters
+    ----------
+    job
+        A function defined at a module's top level, or a `functools.partial` of one.
 
-def _importable(job: Callable[..., Any]) -> tuple[str, str]:
-    """Module and name of a job; a stage run as a program is __main__ here and not there."""
-    module = job.__module__
-    if module == "__main__":
+    Raises
+    ------
+    MachineError
+        The job is neither, or belongs to a script that was not started by ``python -m``.
+    """
+    function = job.func if isinstance(job, partial) else job
+    before = job.args if isinstance(job, partial) else ()
+    keywords = job.keywords if isinstance(job, partial) else {}
+    module, name = getattr(function, "__module__", ""), getattr(function, "__qualname__", "")
+    if getattr(sys.modules.get(module), name, None) is not function:
+        raise MachineError(
+            f"{function!r} cannot run on a cluster: a node finds a job by its name",
+            "Define it at the top level of a module",
+        )
+    if module == "__main__":  # a stage run as a program, which has its own name on a node
         spec = sys.modules["__main__"].__spec__
         if spec is None:
             raise MachineError(
                 "a script's own function cannot run on a cluster", "Run it with python -m"
             )
         module = spec.name
-    return module, job.__name__
+    return JobByName(module, name, before, keywords)
+
+
+def _run_there(job: JobByName, folder: str, item: Any) -> Any:
+    """On a node: the job, in the folder that relative paths start from."""
+    os.chdir(folder)
+    if folder not in sys.path:
+        sys.path.insert(0, folder)
+    return job(item)

@@ -22,6 +22,16 @@ print(hashlib.sha256(b"".join(p.tobytes() for p in products)).hexdigest())
 """
 
 
+LOGARITHMS = """
+import numpy as np
+import hashlib
+x = np.random.default_rng(0).random(4096) + 0.5
+print(hashlib.sha256(np.log(x).tobytes() + np.exp(x).tobytes()).hexdigest())
+"""
+NO_AVX512 = "X86_V4 AVX512_ICL AVX512_SPR"  # NumPy's names
+CHOICES = ("OPENBLAS_CORETYPE", "NPY_DISABLE_CPU_FEATURES", "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES")
+
+
 def product(before: str, kernels: str | None) -> str:
     """Digest of a product of matrices in an interpreter of its own."""
     told = said(before + PRODUCT, kernels)
@@ -29,10 +39,10 @@ def product(before: str, kernels: str | None) -> str:
     return told
 
 
-def said(script: str, kernels: str | None) -> str:
+def said(script: str, kernels: str | None = None, **chosen: str) -> str:
     """What a script prints in an interpreter of its own, where nothing else chose kernels."""
-    hidden = ("OPENBLAS_CORETYPE", VARIABLE)  # what checks shapes imports NumPy too
-    env = {name: value for name, value in os.environ.items() if name not in hidden}
+    hidden = (*CHOICES, VARIABLE)  # what checks shapes imports NumPy too
+    env = {name: value for name, value in os.environ.items() if name not in hidden} | chosen
     if kernels is not None:
         env["OPENBLAS_CORETYPE"] = kernels
     command = [sys.executable, "-c", script]
@@ -66,3 +76,19 @@ def test_a_stage_settles_it_before_numpy_comes(stage: str) -> None:
     )
     chosen = "Haswell" if HAS_AVX2 else None
     assert said(script, None).split() == ["True", str(chosen)]
+
+
+@pytest.mark.skipif(not HAS_AVX2, reason="this processor has no AVX2")
+def test_logarithms_are_those_of_a_processor_without_avx512() -> None:
+    pinned = said("import pipeline\n" + LOGARITHMS)
+    assert pinned == said(LOGARITHMS, NPY_DISABLE_CPU_FEATURES=NO_AVX512)
+
+
+COMPILED_FOR = "from numba import config\nprint(repr((config.CPU_NAME, config.CPU_FEATURES)))\n"
+
+
+@pytest.mark.skipif(not HAS_AVX2, reason="this processor has no AVX2")
+def test_code_is_compiled_for_one_kind_of_processor_unless_told_otherwise() -> None:
+    assert said("import pipeline.gripper\n" + COMPILED_FOR) == "('haswell', '')\n"
+    chosen = said("import pipeline.gripper\n" + COMPILED_FOR, NUMBA_CPU_NAME="generic")
+    assert chosen == "('generic', '')\n"

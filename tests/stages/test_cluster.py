@@ -1,10 +1,7 @@
 """A Ray cluster of two nodes gives the bytes of local processes, though a node is killed."""
 
 import hashlib
-import os
-import shutil
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,10 +9,14 @@ from pathlib import Path
 import pytest
 
 from pipeline.execution import RunFolder
-from tests.stages.conftest import ROOT
+from stages.graph import STAGES
+from tests.docs.pages import blocks_of
+from tests.stages.conftest import TINY
+from tests.stages.project_copy import copied_project, quiet_environment
 
 cluster_utils = pytest.importorskip("ray.cluster_utils", reason="Ray is not installed")
-PATIENCE_S = 240
+DOCUMENTED = "make dataset RUN=ci EXECUTOR=ray"
+PATIENCE_S = 900
 
 
 @pytest.fixture
@@ -29,32 +30,47 @@ def cluster() -> Iterator[object]:
 
 
 def digests(folder: RunFolder) -> dict[str, str]:
-    files = [folder.artifact("grasps"), *sorted(folder.shards("grasps").glob("*.mcap"))]
-    return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+    """SHA-256 of every artifact that the stages hand over."""
+    files = [folder.artifact(stage) for stage in STAGES]
+    for stage in STAGES:
+        files += sorted(path for path in folder.shards(stage).rglob("*") if path.is_file())
+    return {
+        path.relative_to(folder.path).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in files
+    }
 
 
-def test_two_nodes_one_killed_midway_write_the_same_bytes(
+def test_six_stages_from_cold_write_the_bytes_of_local_processes_though_a_node_dies(
     cluster: object, run: RunFolder, tmp_path: Path
 ) -> None:
+    """The command that the page shows, on a run of which nothing is made."""
+    assert DOCUMENTED in [
+        line for block in blocks_of("runs/README.md") for line in block.splitlines()
+    ]
     nodes = [cluster.add_node(num_cpus=1, object_store_memory=10**8) for _ in range(2)]  # type: ignore[attr-defined]
-    folder = RunFolder(tmp_path / "runs" / run.path.name)
-    folder.path.mkdir(parents=True)
-    for name in ("run.toml", "objects.mcap", "scenes.mcap"):
-        shutil.copy(run.path / name, folder.path / name)
-    command = [sys.executable, "-m", "stages.grasps", "--run", run.path.name]
-    process = subprocess.Popen(
-        [*command, "--runs-dir", str(folder.path.parent), "--executor", "ray"],
-        cwd=ROOT,
-        env=os.environ | {"RAY_ADDRESS": cluster.address},  # type: ignore[attr-defined]
-        stderr=subprocess.PIPE,
-        text=True,
+    copy = copied_project(tmp_path / "softgrip")
+    folder = RunFolder(copy / "runs" / "ci")
+    folder.path.mkdir()
+    folder.config.write_text(TINY)
+    environment = quiet_environment() | {"RAY_ADDRESS": cluster.address}  # type: ignore[attr-defined]
+    dataset = subprocess.Popen(
+        DOCUMENTED.split(), cwd=copy, env=environment, stderr=subprocess.PIPE, text=True
     )
     deadline = time.monotonic() + PATIENCE_S
     while not list(folder.shards("grasps").glob("*.mcap")):
-        assert process.poll() is None, process.stderr and process.stderr.read()[-3000:]
+        assert dataset.poll() is None, dataset.stderr and dataset.stderr.read()[-3000:]
         assert time.monotonic() < deadline, "no shard was made"
         time.sleep(0.05)
     cluster.remove_node(nodes[0], allow_graceful=False)  # type: ignore[attr-defined]
-    _, errors = process.communicate(timeout=PATIENCE_S)
-    assert process.returncode == 0, errors[-3000:]
+    _, errors = dataset.communicate(timeout=PATIENCE_S)
+    assert dataset.returncode == 0, errors[-3000:]
+    judged = subprocess.run(
+        ["make", "eval", "RUN=ci", "EXECUTOR=ray"],
+        cwd=copy,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert judged.returncode == 0, judged.stderr[-3000:]
     assert digests(folder) == digests(run)

@@ -1,9 +1,7 @@
 """Every command that the pages show runs, on a tiny run in a copy of the project."""
 
-import os
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -12,33 +10,23 @@ import trimesh
 from pipeline.config import load_run_config
 from pipeline.execution import RunFolder
 from tests.docs.pages import PAGES, REDUCED, ROOT, as_run, blocks_of
+from tests.stages.project_copy import copied_project, quiet_environment
 
-NOT_COPIED = (".git", ".venv", ".cache", "*_cache", "__pycache__", ".hypothesis", "node_modules")
 SHOWN_RUNS = ("ci", "default")
-
-
-def its_own_venv(copy: Path) -> None:
-    """The environment that runs the tests, under the copy's own name: `make` finds it ready."""
-    venv = copy / ".venv"
-    venv.mkdir()
-    for part in Path(sys.prefix).iterdir():
-        if part.name != ".ready":
-            (venv / part.name).symlink_to(part)
-    (venv / ".ready").touch()
+# Its commands make run ci from nothing; those of the other pages find a tiny one made.
+FROM_COLD = "README.md"
 
 
 @pytest.fixture(scope="module")
 def copy(run: RunFolder, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The project, with a tiny run in the place of those that the pages name, and some meshes."""
-    copy = tmp_path_factory.mktemp("copy") / "softgrip"
-    shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(*NOT_COPIED, "runs"))
+    copy = copied_project(tmp_path_factory.mktemp("copy") / "softgrip")
     shutil.copytree(ROOT / "runs" / "pictures", copy / "runs" / "pictures")
     for name in SHOWN_RUNS:
         shutil.copytree(run.path, copy / "runs" / name)
     for config in (ROOT / "runs").glob("*/run.toml"):
         if config.parent.name not in SHOWN_RUNS:
             shutil.copytree(config.parent, copy / "runs" / config.parent.name, ignore=only_config)
-    its_own_venv(copy)
     meshes = copy / "meshes"
     meshes.mkdir()
     trimesh.creation.box(extents=(0.1, 0.06, 0.04)).export(meshes / "box.stl")
@@ -56,11 +44,11 @@ def only_config(folder: str, names: list[str]) -> list[str]:
 
 @pytest.mark.parametrize("page", PAGES)
 def test_every_command_of_a_page_runs(copy: Path, page: str) -> None:
-    environment = {
-        name: value
-        for name, value in os.environ.items()
-        if name not in ("MESH_DIR", "RUN", "STAGE", "FORMAT", "MAKEFLAGS", "MAKELEVEL", "MFLAGS")
-    }
+    environment = quiet_environment()
+    if page == FROM_COLD:
+        for made in (copy / "runs" / "ci").iterdir():
+            if made.name != "run.toml":
+                shutil.rmtree(made) if made.is_dir() else made.unlink()
     blocks, no_driver = blocks_of(page), False
     assert blocks
     for block in blocks:
