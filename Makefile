@@ -140,9 +140,10 @@ lint: .venv/.ready
 	$(PY) -m schemas.generate --check
 
 # Run ci on the embedded objects, whatever MESH_DIR says: they are the same everywhere.
+# AFRESH=sapien|embree compares what is made anew with that renderer, without the closed loop.
 regress:  ## run ci held against its reference; ACCEPT=1 renews the reference
-	@$(MAKE) --no-print-directory runs/ci/evaluate.mcap RUN=ci MESH_DIR=
-	@$(PY) -m stages.regress $(if $(ACCEPT),--accept)
+	@$(MAKE) --no-print-directory runs/ci/$(if $(AFRESH),objects,evaluate).mcap RUN=ci MESH_DIR=
+	@$(PY) -m stages.regress $(if $(AFRESH),--afresh $(AFRESH)) $(if $(ACCEPT),--accept)
 
 SECONDS_A_READER ?= 60
 fuzz: .venv/.ready  ## coverage-guided fuzzing of the readers, SECONDS_A_READER each

@@ -9,8 +9,8 @@ _CPU = Path("/proc/cpuinfo")
 # The arithmetic of one kind of processor on every one that has AVX2. Where there is AVX-512 these
 # libraries take other kernels by themselves, and a last bit that differs settles a clutter
 # elsewhere: OpenBLAS sums products in another order, NumPy's exp and log end on other bits, and
-# numba compiles other instructions (which take off 6 % of a label's time, measured). Each reads its variable
-# when it is imported; a choice made outside stands, and workers inherit these.
+# numba compiles other instructions (they would save 6 % of the time of a label, measured). Each
+# reads its variable when it is imported; a choice made outside stands, and workers inherit these.
 _ONE_KIND = {
     "OPENBLAS_CORETYPE": {"OPENBLAS_CORETYPE": "Haswell"},
     "NPY_DISABLE_CPU_FEATURES": {"NPY_DISABLE_CPU_FEATURES": "X86_V4 AVX512_ICL AVX512_SPR"},

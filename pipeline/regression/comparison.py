@@ -15,11 +15,17 @@ class Rule:
     Attributes
     ----------
     name
-        Of one of them, its item in place of ``{}``.
+        Of one quantity, its item in place of ``{}``.
+    unit
+        Behind its value, where it has one.
     absolute, relative
         The larger of both is allowed; none of both means equal.
     between
-        Groups that hold the least and the greatest value allowed, item by item.
+        Groups of the reference that hold the least and the greatest value allowed, item by item.
+    each_in_run
+        Whether every item of the reference must be in the run.
+    compared
+        Whether the group is compared at all: bounds are not.
     """
 
     name: str
@@ -27,11 +33,17 @@ class Rule:
     absolute: float = 0.0
     relative: float = 0.0
     between: tuple[str, str] | None = None
+    each_in_run: bool = True
     compared: bool = True
 
 
-# Numbers that arithmetic alone decides are held tightly; what a chaotic settling, a training or
-# a few attempts decide gets the room that another processor or renderer takes.
+def _bound(name: str) -> Rule:
+    return Rule(name, compared=False)
+
+
+# Numbers that arithmetic alone decides are held tightly, those of a chaotic settling loosely. What
+# a renderer decides has bounds for each; what a training decides has those that trainings under
+# several instruction sets gave (`spread`).
 RULES = {
     "nsvr": Rule("NSVR of {}", relative=1e-6),
     "shape_class": Rule("class of {}"),
@@ -41,13 +53,25 @@ RULES = {
     "stacked_gap_mm": Rule("gap of {}", "mm", absolute=1.0),
     "grasps": Rule("number of {}"),
     "q_histogram": Rule("grasps with q in {}", absolute=30, relative=0.1),
+    "baseline_error": Rule("test error of baseline {}", absolute=0.02),
     "pad_q": Rule("q of {}", absolute=1e-6),
     "pad_status": Rule("status of {}"),
+    "prediction": Rule("q-hat of the kept network for {}", absolute=1e-5),
+    "control_prediction": Rule("q-hat in control of the kept network for {}", absolute=1e-5),
+    "kept_error": Rule(
+        "test error of the kept network, pictures by {}",
+        between=("kept_error_low", "kept_error_high"),
+        each_in_run=False,
+    ),
+    "kept_error_low": _bound("least test error of the kept network, pictures by {}"),
+    "kept_error_high": _bound("greatest test error of the kept network, pictures by {}"),
     "network": Rule("{} of the network"),
-    "error": Rule("{}", absolute=0.02),
-    "success": Rule("success at {}", between=("success_low", "success_high")),
-    "success_low": Rule("least success at {}", compared=False),
-    "success_high": Rule("greatest success at {}", compared=False),
+    "trained": Rule("{}", between=("trained_low", "trained_high")),
+    "trained_low": _bound("least {}"),
+    "trained_high": _bound("greatest {}"),
+    "lifted": Rule("share of objects lifted at {}", between=("lifted_low", "lifted_high")),
+    "lifted_low": _bound("least share of objects lifted at {}"),
+    "lifted_high": _bound("greatest share of objects lifted at {}"),
 }
 
 
@@ -65,11 +89,21 @@ class Difference:
 
 
 def differences(now: Figures, reference: Figures) -> Iterator[Difference]:
-    """Every quantity outside of what it may move, in the order of ``RULES``."""
+    """Every quantity outside of what it may move, in the order of ``RULES``.
+
+    Parameters
+    ----------
+    now
+        The run's figures.
+    reference
+        What they are held against: groups of values, and of bounds.
+    """
     for group, rule in RULES.items():
         if not rule.compared:
             continue
         before, after = reference.get(group, {}), now.get(group, {})
+        if not rule.each_in_run:
+            before = {item: value for item, value in before.items() if item in after}
         for item in [*before, *(item for item in after if item not in before)]:
             name = rule.name.format(item)
             was, there = _shown(before.get(item), rule), _shown(after.get(item), rule)

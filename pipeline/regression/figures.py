@@ -1,6 +1,6 @@
 """The figures of a finished run that its reference keeps, read from its artifacts."""
 
-import json
+from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.artifacts import from_tensor, open_artifact
@@ -10,21 +10,45 @@ from pipeline.config import load_run_config
 from pipeline.execution import RunFolder
 from pipeline.gripper import GraspStatus
 from pipeline.messages.objects import read_objects
+from pipeline.messages.samples import read_split
 from pipeline.messages.scenes import read_scenes
 from pipeline.regression.comparison import Figures, Value
+from pipeline.regression.kept_network import (
+    control_predictions,
+    error_on,
+    predictions,
+    read_network,
+    read_samples,
+)
 from pipeline.regression.pads import labelled_pads
-from schemas.softgrip.v1.training_pb2 import TrainingResult
+from pipeline.regression.spread import trained_figures
+from schemas.softgrip.v1.evaluation_pb2 import LevelResult
+from schemas.softgrip.v1.scenes_pb2 import Scene
+from schemas.softgrip.v1.training_pb2 import Epoch, TrainingResult
 
 
-def figures_of(run: RunFolder, pads: Path) -> Figures:
-    """All that ``make regress`` compares."""
+@dataclass(frozen=True)
+class Kept:
+    """The committed files that a run is held against, beside its reference."""
+
+    pads: Path
+    network: Path
+    samples: Path
+
+
+def figures_of(run: RunFolder, kept: Kept) -> Figures:
+    """All that ``make regress`` compares of a run that is finished up to the training.
+
+    What the closed loop lifted is among them where the closed loop was run.
+    """
     return (
         object_figures(run)
         | scene_figures(run)
         | grasp_figures(run)
-        | pad_figures(run, pads)
+        | pad_figures(run, kept.pads)
+        | kept_network_figures(run, kept)
         | training_figures(run)
-        | success_figures(run)
+        | (success_figures(run) if run.artifact("evaluate").is_file() else {})
     )
 
 
@@ -76,24 +100,51 @@ def pad_figures(run: RunFolder, pads: Path) -> Figures:
     }
 
 
-def training_figures(run: RunFolder) -> Figures:
-    """The network's size, and its error beside that of what it has to beat."""
-    with open_artifact(run.artifact("train")) as artifact:
-        result = artifact.one(TrainingResult)
-    errors = {"test MAE": result.test_mae}
-    errors |= {f"test MAE of baseline {n}": v for n, v in sorted(result.baseline_mae.items())}
+def kept_network_figures(run: RunFolder, kept: Kept) -> Figures:
+    """What the kept network answers for kept samples, and its error on the run's test split.
+
+    The error's bounds are those that a reference takes over.
+    """
+    network, samples = read_network(kept.network), read_samples(kept.samples)
+    names = [f"sample {number}" for number in range(len(samples))]
+    error = error_on(network, read_split(run.artifact("shards"), "test"))
+    renderer = renderer_of(run)
     return {
+        "prediction": dict(zip(names, predictions(network, samples).tolist(), strict=True)),
+        "control_prediction": dict(
+            zip(names, control_predictions(network, samples).tolist(), strict=True)
+        ),
+        "kept_error": {renderer: error.mean},
+        "kept_error_low": {renderer: error.least},
+        "kept_error_high": {renderer: error.greatest},
+    }
+
+
+def renderer_of(run: RunFolder) -> str:
+    """Whose pictures the run's are: ``sapien`` or ``embree``."""
+    with open_artifact(run.artifact("scenes")) as artifact:
+        _, scene = next(iter(artifact.messages(Scene)))
+    return str(scene.renderer)
+
+
+def training_figures(run: RunFolder) -> Figures:
+    """The network's size, how it learned, and the error of what it has to beat."""
+    with open_artifact(run.artifact("train")) as artifact:
+        epochs = [message for _, message in artifact.messages(Epoch)]
+        result = artifact.one(TrainingResult)
+    return {
+        "baseline_error": dict(sorted(result.baseline_mae.items())),
         "network": {"layers": result.layers, "parameters": result.parameters},
-        "error": dict(errors),
+        "trained": trained_figures(
+            [epoch.train_mae for epoch in epochs],
+            [epoch.val_mae for epoch in epochs],
+            result.test_mae,
+        ),
     }
 
 
 def success_figures(run: RunFolder) -> Figures:
-    """Success by level with its 95 % interval, within which it may move."""
-    by_level = json.loads(run.summary("evaluate").read_text())["success_by_level"]
-    names = {level: f"level {level}" for level in sorted(by_level)}
-    return {
-        "success": {name: by_level[level]["rate"] for level, name in names.items()},
-        "success_low": {n: by_level[level]["interval_95"][0] for level, n in names.items()},
-        "success_high": {n: by_level[level]["interval_95"][1] for level, n in names.items()},
-    }
+    """Share of the objects in the test clutters that the closed loop lifted, by level."""
+    with open_artifact(run.artifact("evaluate")) as artifact:
+        levels = [message for _, message in artifact.messages(LevelResult, "/levels")]
+    return {"lifted": {f"level {one.level}": one.lifted / one.objects for one in levels}}

@@ -21,6 +21,11 @@ REDUCED = {
         "make -n regress",
         "the reference is of run ci and a tiny one stands in its place; tests/regression runs it",
     ),
+    "ATEN_CPU_CAPABILITY=default ONEDNN_MAX_CPU_ISA=SSE41 NUMBA_CPU_NAME=generic"
+    " make regress AFRESH=embree": (
+        "make -n regress AFRESH=embree",
+        "CI runs it",
+    ),
     "make review RUN=ci STAGE=grasps": (
         "make -n review RUN=ci STAGE=grasps",
         "it ends when its viewer is closed; tests/stages/test_review.py opens it",
