@@ -96,6 +96,15 @@ def main(
 def read_reference(path: Path) -> Figures:
     """The committed figures.
 
+    Parameters
+    ----------
+    path
+        The committed file.
+
+    Returns
+    -------
+    Figures by group and name.
+
     Raises
     ------
     ArtifactError
@@ -127,9 +136,22 @@ def accepted(now: Figures, kept: Figures, groups: tuple[str, ...]) -> Figures:
 def made_afresh(source: RunFolder, renderer: RendererName) -> Iterator[RunFolder]:
     """The run up to its training, made from its objects in a folder that is removed afterwards.
 
+    Parameters
+    ----------
+    source
+        A finished run: its configuration and objects are taken.
+    renderer
+        What draws the pictures.
+
+    Yields
+    ------
+    RunFolder
+        The new run.
+
     Raises
     ------
-    SoftgripError : a stage failed.
+    SoftgripError
+        a stage failed.
     """
     with TemporaryDirectory(prefix="softgrip-regress-") as scratch:
         folder = RunFolder(Path(scratch) / source.path.name)

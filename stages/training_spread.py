@@ -27,7 +27,7 @@ from schemas.softgrip.v1.training_pb2 import Epoch, TrainingResult
 from stages.graph import RUNS_DIR
 
 SPREAD = Path("tests/regression/training_spread.json")
-SEEDS = 5
+SEEDS = 5  # trainings an instruction set: enough to see their spread
 
 
 def main(
@@ -89,6 +89,17 @@ def with_seed(text: str, seed: int) -> str:
 
 def run_under(instructions: str, stage: str, folder: RunFolder, workers: int) -> None:
     """Run a stage in a process that takes an instruction set.
+
+    Parameters
+    ----------
+    instructions
+        Name of the instruction set.
+    stage
+        Stage that is run.
+    folder
+        The run.
+    workers
+        Worker processes.
 
     Raises
     ------

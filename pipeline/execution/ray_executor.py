@@ -118,6 +118,10 @@ def job_by_name(job: Callable[[Item], Result]) -> JobByName:
     job
         A function defined at a module's top level, or a `functools.partial` of one.
 
+    Returns
+    -------
+    Where the function is found, with its arguments.
+
     Raises
     ------
     MachineError

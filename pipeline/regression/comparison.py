@@ -21,7 +21,8 @@ class Rule:
     absolute, relative
         The larger of both is allowed; none of both means equal.
     between
-        Groups of the reference that hold the least and the greatest value allowed, item by item.
+        Groups of the reference that hold the least and the greatest value allowed, item by
+        item.
     each_in_run
         Whether every item of the reference must be in the run.
     compared
@@ -97,6 +98,11 @@ def differences(now: Figures, reference: Figures) -> Iterator[Difference]:
         The run's figures.
     reference
         What they are held against: groups of values, and of bounds.
+
+    Yields
+    ------
+    Difference
+        One quantity that moved too far.
     """
     for group, rule in RULES.items():
         if not rule.compared:

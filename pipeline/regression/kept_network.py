@@ -18,7 +18,7 @@ from pipeline.network.control_inference import ControlPredictor
 from pipeline.network.export import export_onnx_bytes
 from pipeline.network.ga_cnn import GaCnn
 from pipeline.network.inference import predict
-from pipeline.network.samples import Samples, joined_samples
+from pipeline.network.samples import Samples, join_samples
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 
 TOPIC = "/samples"
@@ -61,7 +61,7 @@ def write_samples(path: Path, provenance: Provenance, samples: Samples) -> None:
 def read_samples(path: Path) -> Samples:
     """The kept samples."""
     with open_artifact(path) as artifact:
-        return joined_samples([samples_of(artifact.one(SampleBatch))])  # a copy, not a view
+        return join_samples([samples_of(artifact.one(SampleBatch))])  # a copy, not a view
 
 
 def spread_over_quality(samples: Samples, count: int) -> Samples:

@@ -42,8 +42,8 @@ class Training:
     test_error
         Mean |q̂ − q| over the test split with the weights of the best epoch.
     objects, lifted, attempts
-        Objects that lay in the test clutters, those that the closed loop lifted, and its attempts,
-        by level; empty where the closed loop was not run.
+        Objects that lay in the test clutters, those that the closed loop lifted, and its
+        attempts, by level; empty where the closed loop was not run.
     """
 
     instructions: str
@@ -128,6 +128,15 @@ def write_spread(path: Path, measured_by: dict[str, str], trainings: Sequence[Tr
 
 def read_spread(path: Path) -> list[Training]:
     """The measured trainings.
+
+    Parameters
+    ----------
+    path
+        training_spread.json.
+
+    Returns
+    -------
+    Every training that was measured.
 
     Raises
     ------
