@@ -137,6 +137,7 @@ lint: .venv/.ready
 	$(PY) -m ruff format --check .
 	$(PY) -m mypy
 	.venv/bin/lint-imports --no-logo
+	.venv/bin/pydoclint --quiet pipeline stages
 	$(PY) -m schemas.generate --check
 
 # Run ci on the embedded objects, whatever MESH_DIR says: they are the same everywhere.
