@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import numpy as np
+import trimesh
 from jaxtyping import Float
-from plyfile import PlyData, PlyParseError
 from pypcd4 import PointCloud
 
 from pipeline.camera.depth_files import LIKELY_M
@@ -65,13 +65,14 @@ def read_cloud_m(path: Path, scale_m: float | None) -> Float[np.ndarray, "n 3"]:
 
 def _from_ply(path: Path) -> np.ndarray:
     try:
-        vertices = PlyData.read(str(path))["vertex"]
-        columns = [np.asarray(vertices[axis], dtype=np.float64) for axis in "xyz"]
-    except (PlyParseError, KeyError, ValueError, OSError, UnicodeDecodeError) as error:
+        with path.open("rb") as file:
+            loaded = trimesh.load(file, file_type="ply", process=False)
+        points = np.asarray(loaded.vertices, dtype=np.float64)
+    except (ValueError, KeyError, IndexError, TypeError, AttributeError, OSError) as error:
         raise PictureError(
             f"{path} cannot be read as a PLY point cloud: {error}", "Write it again"
         ) from error
-    return np.stack(columns, axis=1)
+    return points
 
 
 def _from_pcd(path: Path) -> np.ndarray:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from plyfile import PlyData, PlyElement
+import trimesh
 from pypcd4 import PointCloud
 
 from pipeline.camera.cloud_files import read_cloud_m
@@ -21,11 +21,7 @@ def written(path: Path, points: np.ndarray) -> Path:
     elif path.suffix == ".pcd":
         PointCloud.from_xyz_points(points.astype(np.float32)).save(str(path))
     else:
-        rows = np.array(
-            [tuple(p) for p in points.astype(np.float32)],
-            dtype=[("x", "f4"), ("y", "f4"), ("z", "f4")],
-        )
-        PlyData([PlyElement.describe(rows, "vertex")]).write(str(path))
+        trimesh.PointCloud(points).export(path)
     return path
 
 

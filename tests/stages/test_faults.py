@@ -216,7 +216,8 @@ def test_a_worker_killed_for_its_memory(run: RunFolder, tmp_path: Path, stage: s
     """SIGKILL to one worker is what the kernel's out-of-memory killer does."""
     folder = before(run, stage, tmp_path)
     process = started(stage, tmp_path, workers=2)
-    wait_until(process, lambda: bool(workers_of(process.pid)))
+    # Both are there: concurrent.futures trips over a worker that starts while another dies.
+    wait_until(process, lambda: len(workers_of(process.pid)) == 2)
     os.kill(workers_of(process.pid)[0], signal.SIGKILL)
     _, said = process.communicate(timeout=300)
     done = subprocess.CompletedProcess(process.args, process.returncode, "", said)
