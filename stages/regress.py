@@ -94,22 +94,7 @@ def main(
 
 
 def read_reference(path: Path) -> Figures:
-    """The committed figures.
-
-    Parameters
-    ----------
-    path
-        The committed file.
-
-    Returns
-    -------
-    Figures by group and name.
-
-    Raises
-    ------
-    ArtifactError
-        There are none.
-    """
+    """The committed figures, by group and name; ArtifactError where there are none."""
     if not path.is_file():
         raise ArtifactError(f"{path} does not exist", "Make it: make regress ACCEPT=1")
     figures: Figures = json.loads(path.read_text())
