@@ -5,7 +5,9 @@ A job that dies with its node is made again on another: jobs keep what is alread
 """
 
 import importlib
+import io
 import os
+import pickle
 import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -89,16 +91,16 @@ def run_on_ray(job: Callable[[Item], Result], items: Iterable[Item]) -> Iterator
             f"no Ray cluster answers ({error})", "Start one with 'ray start --head'"
         ) from error
     remote = ray.remote(num_cpus=1, max_retries=MOST_RETRIES)(_run_there)
-    there = str(Path.cwd())
+    there, program = str(Path.cwd()), _program()
     ahead = AHEAD_PER_CPU * max(1, int(ray.cluster_resources().get("CPU", 1)))
     waiting: deque[Any] = deque()
     try:
         for item in items:
-            waiting.append(remote.remote(named, there, item))
+            waiting.append(remote.remote(pickle.dumps((named, item)), there, program))
             if len(waiting) >= ahead:
-                yield ray.get(waiting.popleft())
+                yield _unpickled(ray.get(waiting.popleft()), {program: "__main__"})
         while waiting:
-            yield ray.get(waiting.popleft())
+            yield _unpickled(ray.get(waiting.popleft()), {program: "__main__"})
     except RayTaskError as error:
         raise error.cause from error
     except WorkerCrashedError as error:
@@ -136,19 +138,52 @@ def job_by_name(job: Callable[[Item], Result]) -> JobByName:
             f"{function!r} cannot run on a cluster: a node finds a job by its name",
             "Define it at the top level of a module",
         )
-    if module == "__main__":  # a stage run as a program, which has its own name on a node
-        spec = sys.modules["__main__"].__spec__
-        if spec is None:
+    if module == "__main__":
+        module = _program()
+        if module == "__main__":
             raise MachineError(
                 "a script's own function cannot run on a cluster", "Run it with python -m"
             )
-        module = spec.name
     return JobByName(module, name, before, keywords)
 
 
-def _run_there(job: JobByName, folder: str, item: Any) -> Any:
-    """On a node: the job, in the folder that relative paths start from."""
+def _program() -> str:
+    """Name of the module that ``python -m`` runs as ``__main__``; it has that name on a node."""
+    spec = getattr(sys.modules["__main__"], "__spec__", None)
+    return "__main__" if spec is None else str(spec.name)
+
+
+def _run_there(sent: bytes, folder: str, program: str) -> bytes:
+    """On a node: a pickled job and item in, its pickled result out.
+
+    Ray's own pickling would take the classes of a program along; there, they would be others than
+    those of the module.
+
+    Parameters
+    ----------
+    sent
+        `JobByName` and the item.
+    folder
+        That relative paths start from.
+    program
+        Module that is ``__main__`` where the item comes from.
+
+    Returns
+    -------
+    What the job makes of the item.
+    """
     os.chdir(folder)
     if folder not in sys.path:
         sys.path.insert(0, folder)
-    return job(item)
+    job, item = _unpickled(sent, {"__main__": program})
+    return pickle.dumps(job(item))
+
+
+def _unpickled(data: bytes, renamed: dict[str, str]) -> Any:
+    """What was pickled by another process of this run, with modules by their names here."""
+
+    class Unpickler(pickle.Unpickler):
+        def find_class(self, module_name: str, global_name: str) -> Any:
+            return super().find_class(renamed.get(module_name, module_name), global_name)
+
+    return Unpickler(io.BytesIO(data)).load()

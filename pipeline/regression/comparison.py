@@ -59,13 +59,10 @@ RULES = {
     "pad_status": Rule("status of {}"),
     "prediction": Rule("q-hat of the kept network for {}", absolute=1e-5),
     "control_prediction": Rule("q-hat in control of the kept network for {}", absolute=1e-5),
+    # A hundred times what Embree's pictures of run ci moved it by against SAPIEN's (2e-5).
     "kept_error": Rule(
-        "test error of the kept network, pictures by {}",
-        between=("kept_error_low", "kept_error_high"),
-        each_in_run=False,
+        "test error of the kept network, pictures by {}", absolute=2e-3, each_in_run=False
     ),
-    "kept_error_low": _bound("least test error of the kept network, pictures by {}"),
-    "kept_error_high": _bound("greatest test error of the kept network, pictures by {}"),
     "network": Rule("{} of the network"),
     "trained": Rule("{}", between=("trained_low", "trained_high")),
     "trained_low": _bound("least {}"),

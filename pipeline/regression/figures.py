@@ -101,22 +101,16 @@ def pad_figures(run: RunFolder, pads: Path) -> Figures:
 
 
 def kept_network_figures(run: RunFolder, kept: Kept) -> Figures:
-    """What the kept network answers for kept samples, and its error on the run's test split.
-
-    The error's bounds are those that a reference takes over.
-    """
+    """What the kept network answers for kept samples, and its error on the run's test split."""
     network, samples = read_network(kept.network), read_samples(kept.samples)
     names = [f"sample {number}" for number in range(len(samples))]
     error = error_on(network, read_split(run.artifact("shards"), "test"))
-    renderer = renderer_of(run)
     return {
         "prediction": dict(zip(names, predictions(network, samples).tolist(), strict=True)),
         "control_prediction": dict(
             zip(names, control_predictions(network, samples).tolist(), strict=True)
         ),
-        "kept_error": {renderer: error.mean},
-        "kept_error_low": {renderer: error.least},
-        "kept_error_high": {renderer: error.greatest},
+        "kept_error": {renderer_of(run): error},
     }
 
 

@@ -4,8 +4,6 @@ What it predicts for kept samples holds the network's input, its layers and its 
 error on a run's own samples holds pictures, noise and sub clouds together with the labels.
 """
 
-import math
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -23,27 +21,6 @@ from schemas.softgrip.v1.samples_pb2 import SampleBatch
 
 TOPIC = "/samples"
 BATCH = 64  # samples predicted at a time
-# An error is a mean over a few hundred grasps, which another renderer draws anew where a pixel
-# moves: three standard errors of that mean leave it room once in 370 times.
-STANDARD_ERRORS = 3.0
-
-
-@dataclass(frozen=True)
-class MeanError:
-    """Mean |q̂ − q| with its standard error, both in units of q."""
-
-    mean: float
-    standard_error: float
-
-    @property
-    def least(self) -> float:
-        """What another renderer's sample may come down to."""
-        return self.mean - STANDARD_ERRORS * self.standard_error
-
-    @property
-    def greatest(self) -> float:
-        """What another renderer's sample may come up to."""
-        return self.mean + STANDARD_ERRORS * self.standard_error
 
 
 def read_network(path: Path) -> GaCnn:
@@ -83,7 +60,6 @@ def control_predictions(network: GaCnn, samples: Samples) -> Float[np.ndarray, "
     return predictor.predict(samples.cloud, samples.cloud_mask)
 
 
-def error_on(network: GaCnn, samples: Samples) -> MeanError:
-    """The network's error on samples of a run."""
-    errors = np.abs(predictions(network, samples) - samples.quality).astype(np.float64)
-    return MeanError(float(errors.mean()), float(errors.std(ddof=1)) / math.sqrt(len(errors)))
+def error_on(network: GaCnn, samples: Samples) -> float:
+    """Mean |q̂ − q| of the network on samples of a run."""
+    return float(np.abs(predictions(network, samples) - samples.quality).astype(np.float64).mean())

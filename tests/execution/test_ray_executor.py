@@ -3,14 +3,20 @@
 What a cluster makes of jobs is in tests/stages/test_cluster.
 """
 
+import os
 import pickle
+import subprocess
+import sys
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 
 import pytest
 
 from pipeline.errors import MachineError
 from pipeline.execution.ray_executor import job_by_name
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def joined(first: str, item: str, last: str = "") -> str:
@@ -28,6 +34,43 @@ def joined(first: str, item: str, last: str = "") -> str:
 def test_a_job_travels_with_its_arguments(job: Callable[[str], str], made: str) -> None:
     sent = pickle.loads(pickle.dumps(job_by_name(job)))  # noqa: S301 - our own bytes
     assert sent("b") == made == job("b")
+
+
+PROGRAM = """
+import pickle
+from dataclasses import dataclass
+from pipeline.execution.ray_executor import _program, _unpickled, job_by_name
+
+@dataclass(frozen=True)
+class Item:
+    number: int
+
+def job(item):
+    assert type(item).__module__ == __name__, type(item).__module__
+    return Item(item.number + 1)
+
+if __name__ == "__main__":
+    sent = pickle.dumps((job_by_name(job), Item(1)))
+    import program  # a second time, as a node does: its classes are others
+    named, item = _unpickled(sent, {"__main__": _program()})
+    assert isinstance(item, program.Item) and not isinstance(item, Item)
+    result = _unpickled(pickle.dumps(named(item)), {_program(): "__main__"})
+    assert result == Item(2), result
+    print("done")
+"""
+
+
+def test_classes_of_a_program_are_those_of_its_module_on_a_node(tmp_path: Path) -> None:
+    (tmp_path / "program.py").write_text(PROGRAM)
+    done = subprocess.run(
+        [sys.executable, "-m", "program"],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.stdout == "done\n", done.stderr
 
 
 def test_a_function_that_no_name_leads_to_is_refused() -> None:
