@@ -53,9 +53,6 @@ def test_six_stages_from_cold_write_the_bytes_of_local_processes_though_a_node_d
     folder.path.mkdir()
     folder.config.write_text(TINY)
     environment = quiet_environment() | {"RAY_ADDRESS": cluster.address}  # type: ignore[attr-defined]
-    # A stage that runs as __main__ sends its jobs by value, as a class of another module's name
-    # than the one that a node's annotations mean: shapes are checked by the tests of each stage.
-    environment.pop("SOFTGRIP_IMPORT_FIRST", None)
     dataset = subprocess.Popen(
         DOCUMENTED.split(), cwd=copy, env=environment, stderr=subprocess.PIPE, text=True
     )
