@@ -64,8 +64,10 @@ class Provenance:
         return dict(json.loads(self.key_parts)["machine"]) if self.key_parts else {}
 
     def to_metadata(self) -> dict[str, str]:
-        """The record as MCAP metadata (strings only)."""
+        """The record as MCAP metadata (strings only); without ``key_parts`` where it has none."""
         fields = asdict(self)
+        if not self.key_parts:
+            del fields["key_parts"]
         fields["inputs"] = json.dumps(fields["inputs"], sort_keys=True)
         record = {name: str(value) for name, value in fields.items()}
         return {**record, DIGEST: _digest(record)}

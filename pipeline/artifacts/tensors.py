@@ -137,6 +137,7 @@ def tensors_of(
                 f"expected {dtype} of ({', '.join(sides)}) with {lengths or 'any length'}"
             )
     for name in absent:
-        shape = [lengths[side] for side in shapes[name].split()]
+        sides = shapes[name].split()
+        shape = [int(side) if side.isdigit() else lengths[side] for side in sides]
         arrays[name] = np.full(shape, unless_there[name], dtype=np.dtype("<" + stored_as[name]))
     return arrays

@@ -1,13 +1,13 @@
 """Catalogue objects ↔ softgrip.v1.CatalogueObject."""
 
 from pathlib import Path
-from typing import cast
+from typing import cast, get_args
 
 import numpy as np
 
 from pipeline.artifacts.names import file_name
 from pipeline.artifacts.reading import open_artifact
-from pipeline.artifacts.tensors import from_tensor, set_tensors, tensors_of, to_tensor
+from pipeline.artifacts.tensors import set_tensors, tensors_of, to_tensor
 from pipeline.errors import ContentError, MeshError
 from pipeline.geometry.catalogue import CatalogueObject, Material
 from pipeline.geometry.mesh import Mesh
@@ -18,6 +18,7 @@ from schemas.softgrip.v1 import objects_pb2
 TOPIC = "/objects"
 REFUSED_TOPIC = "/refused"
 MESH_STORED_AS = {"vertices_m": "f8", "faces": "u4"}
+INERTIA, STRETCH = {"inertia_kg_m2": "f8"}, {"stretch": "f8"}
 
 
 def refused_message(label: str, error: MeshError) -> objects_pb2.RefusedMesh:
@@ -67,19 +68,27 @@ def object_of(message: objects_pb2.CatalogueObject) -> CatalogueObject:
     Raises
     ------
     ContentError
-        It has no such class, a mesh that is none, or a name that is no file's.
+        A word in it is none of those that its field knows, a tensor has another shape, a mesh is
+        none, or its name is no file's.
     """
-    if message.shape_class not in set(ShapeClass):
-        raise ContentError(f"'{message.name}' is of class '{message.shape_class}'")
+    name = file_name(message.name)
+    for field, known in (
+        ("shape_class", set(ShapeClass)),
+        ("unit_origin", get_args(UnitSource)),
+        ("material", get_args(Material)),
+    ):
+        if getattr(message, field) not in known:
+            raise ContentError(f"'{name}' has {field} '{getattr(message, field)}'")
+    stretch = tensors_of(message, STRETCH, {"stretch": "3"}, {"stretch": 1.0})["stretch"]
     return CatalogueObject(
-        name=file_name(message.name),
+        name=name,
         source=message.source,
         source_sha256=message.source_sha256,
         unit=message.unit,
         unit_known_by=cast(UnitSource, message.unit_origin),
         repairs=tuple(message.repairs),
         scale=message.scale,
-        stretch=from_tensor(message.stretch) if message.HasField("stretch") else np.ones(3),
+        stretch=stretch,
         target_extent_m=message.extent_m,
         area_m2=message.area_m2,
         volume_m3=message.volume_m3,
@@ -87,7 +96,7 @@ def object_of(message: objects_pb2.CatalogueObject) -> CatalogueObject:
         shape_class=ShapeClass(message.shape_class),
         mass_kg=message.mass_kg,
         centre_of_mass_m=np.zeros(3),
-        inertia_kg_m2=from_tensor(message.inertia_kg_m2),
+        inertia_kg_m2=tensors_of(message, INERTIA, {"inertia_kg_m2": "3 3"})["inertia_kg_m2"],
         mesh=_mesh(message.mesh),
         convex_parts=tuple(_mesh(part) for part in message.convex_parts),
         material=cast(Material, message.material),

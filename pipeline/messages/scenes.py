@@ -9,14 +9,14 @@ a viewer shows the file as it is.
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import cast
+from typing import cast, get_args
 
 import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from pipeline.artifacts.names import file_name
 from pipeline.artifacts.reading import Artifact, open_artifact
-from pipeline.artifacts.tensors import from_tensor, to_tensor
+from pipeline.artifacts.tensors import from_tensor, tensors_of, to_tensor
 from pipeline.artifacts.writing import ArtifactWriter
 from pipeline.clutter.levels import level_of
 from pipeline.config.cameras import DepthSensor
@@ -29,6 +29,10 @@ from schemas.softgrip.v1 import scenes_pb2
 
 TOPIC = "/scenes"
 NS_PER_SCENE = 1_000_000_000  # a second of log time a scene, so that viewers step through them
+
+POSE, POSE_SHAPE = {"world_from_object": "f8"}, {"world_from_object": "4 4"}
+CAMERA = {"intrinsics": "f8", "world_from_camera": "f8"}
+CAMERA_SHAPES = {"intrinsics": "3 3", "world_from_camera": "4 4"}
 
 # Name of an image → (encoding of foxglove.RawImage, dtype).
 IMAGES = {
@@ -141,18 +145,19 @@ def _scene(artifact: Artifact, message: scenes_pb2.Scene, time_ns: int) -> Clutt
 
 def _placed(message: scenes_pb2.Scene) -> tuple[PlacedObject, ...]:
     return tuple(
-        PlacedObject(p.object_name, p.body_id, from_tensor(p.world_from_object))
-        for p in message.objects
+        PlacedObject(placed.object_name, placed.body_id, **tensors_of(placed, POSE, POSE_SHAPE))
+        for placed in message.objects
     )
 
 
 def _view(artifact: Artifact, viewpoint: scenes_pb2.Viewpoint, time_ns: int) -> CameraView:
+    if viewpoint.sensor not in get_args(DepthSensor):
+        raise ContentError(f"Viewpoint '{viewpoint.name}' has sensor '{viewpoint.sensor}'")
     camera = PinholeCamera(
         name=viewpoint.name,
         width_px=viewpoint.width_px,
         height_px=viewpoint.height_px,
-        intrinsics=from_tensor(viewpoint.intrinsics),
-        world_from_camera=from_tensor(viewpoint.world_from_camera),
+        **tensors_of(viewpoint, CAMERA, CAMERA_SHAPES),
         sensor=cast(DepthSensor, viewpoint.sensor),
         near_m=viewpoint.near_m,
         far_m=viewpoint.far_m,

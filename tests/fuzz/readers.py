@@ -129,7 +129,9 @@ def toml_seeds() -> Iterator[bytes]:
 def mcap_seeds() -> Iterator[bytes]:
     """A small artifact of every compression, and a message of every kind."""
     rng = np.random.default_rng(0)
-    item = CatalogueObject(name="o", nsvr=2.2, shape_class="basic")
+    item = CatalogueObject(
+        name="o", nsvr=2.2, shape_class="basic", unit_origin="declared", material="opaque"
+    )
     item.mesh.vertices_m.CopyFrom(to_tensor(rng.normal(size=(4, 3))))
     item.mesh.faces.CopyFrom(to_tensor(np.array([[0, 1, 2]], dtype=np.uint32)))
     item.inertia_kg_m2.CopyFrom(to_tensor(np.eye(3)))
