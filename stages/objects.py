@@ -1,10 +1,8 @@
 """Stage 1, objects: meshes in → repaired, rescaled, classed by NSVR, cut into convex parts."""
 
-import difflib
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
-from fnmatch import fnmatchcase
 from functools import partial
 from pathlib import Path
 
@@ -12,7 +10,7 @@ from loguru import logger
 
 from pipeline.artifacts import ArtifactWriter, publish_bytes
 from pipeline.config import ObjectsConfig, section_digest
-from pipeline.errors import ConfigError, MeshError
+from pipeline.errors import MeshError
 from pipeline.execution import (
     StageContext,
     Summary,
@@ -30,10 +28,10 @@ from pipeline.geometry.catalogue import (
 from pipeline.geometry.families import DeclaredFamily, read_declared
 from pipeline.geometry.mesh_folders import FAMILIES_FILE, object_names
 from pipeline.geometry.parametric import PARAMETRIC_OBJECTS, parametric_source
-from pipeline.geometry.selection import Split, choose_subset
+from pipeline.geometry.plan import Plan, plan_catalogue
+from pipeline.geometry.selection import Split
 from pipeline.geometry.settled import SETTLED_FILE, read_settled
-from pipeline.geometry.splits import split_objects
-from pipeline.geometry.stretching import near_held_out, stretched_copies
+from pipeline.geometry.stretching import stretched_for_training
 from pipeline.geometry.urdf_files import load_object_file, standalone
 from pipeline.messages.objects import REFUSED_TOPIC, TOPIC, object_message, refused_message
 from pipeline.recording.objects import draw_objects
@@ -48,43 +46,21 @@ def build(stage: StageContext) -> Summary:
     config, seed = stage.config.objects, stage.config.seed
     jobs, added = sources(stage)
     measured, refused = measure(stage, jobs)
-    items = {item.source.name: item for item in measured}
-    classes = {name: item.shape_class for name, item in items.items() if name not in added}
-    if not classes:
-        raise MeshError("Not one mesh could be used", "See the reasons above, or unset MESH_DIR")
-    check_transparent(config, sorted(items))
-    taken = {*choose_subset(classes, config.limit, seed), *added}
     settled_in = stage.folder.state(SETTLED_FILE)
     settled = read_settled(settled_in, settling_basis(stage))
-    split, families = split_objects(
-        [item for name, item in items.items() if name in taken],
-        added & items.keys(),
-        declared_families(stage),
-        stage.config.split,
-        seed,
-        settled,
+    plan = plan_catalogue(
+        measured, added, declared_families(stage), (config, stage.config.split), seed, settled
     )
-    refused += [told(items[name].source.label, why) for name, why in families.joining.items()]
-    cache = stage.folder.cache / "convex_parts"
-    finish = partial(finished, config=config, seed=seed, cache=cache)
-    todo = [item for name, item in items.items() if name in split]
-    results = run_in_order(finish, todo, stage.workers, stage.executor)
-    bare = progress(results, len(todo), "objects: convex parts", "object")
-    objects = [replace(item, family=families.of[item.name]) for item in bare]
-    copies = stretched_copies(
-        [item for item in objects if split[item.name] == "train"],
-        items,
-        config,
-        partial(generator, seed, "object"),
-    )
-    held_out = {name: items[name].descriptor for name, where in split.items() if where != "train"}
-    near = near_held_out(copies, held_out, stage.config.split.family_threshold)
-    objects += [item for item in copies if item.name not in near]
-    splits = split | dict.fromkeys((i.name for i in copies if i.name not in near), "train")
-    now = settled.with_splits({items[name].content: where for name, where in split.items()})
-    publish_bytes(settled_in, now.to_json().encode())
-    publish(stage, objects, splits, refused)
-    return summary(objects, splits, refused) | {"stretched_near_held_out": near}
+    refused += [told(source, why) for source, why in plan.left_out]
+    objects = finish(stage, plan)
+    rng_of = partial(generator, seed, "object")
+    threshold = stage.config.split.family_threshold
+    stretched, near = stretched_for_training(objects, plan, config, rng_of, threshold)
+    objects += stretched
+    split = plan.split | dict.fromkeys((item.name for item in stretched), "train")
+    publish_bytes(settled_in, plan.settled.to_json().encode())
+    publish(stage, objects, split, refused)
+    return summary(objects, split, refused) | {"stretched_near_held_out": near}
 
 
 def settling_basis(stage: StageContext) -> str:
@@ -122,17 +98,6 @@ def sources(stage: StageContext) -> tuple[list[Source], frozenset[str]]:
     return meshes + embedded, frozenset(PARAMETRIC_OBJECTS)
 
 
-def check_transparent(config: ObjectsConfig, names: list[str]) -> None:
-    """Raise ConfigError for a pattern of ``objects.transparent`` that no object has."""
-    for pattern in config.transparent:
-        if not any(fnmatchcase(name, pattern) for name in names):
-            near = difflib.get_close_matches(pattern, names, n=3) or names[:3]
-            raise ConfigError(
-                f"objects.transparent names {pattern!r}, and no object is called so",
-                f"Names are, for instance: {', '.join(near)}",
-            )
-
-
 def measure(
     stage: StageContext, jobs: list[Source]
 ) -> tuple[list[MeasuredObject], list[RefusedMesh]]:
@@ -166,6 +131,15 @@ def measured_or_why_not(
         return measure_object(load_object_file(path, folder, name, config), config)
     except MeshError as error:
         return error
+
+
+def finish(stage: StageContext, plan: Plan) -> list[CatalogueObject]:
+    """Bring every object that is taken to its size, and cut it into convex parts."""
+    cache = stage.folder.cache / "convex_parts"
+    job = partial(finished, config=stage.config.objects, seed=stage.config.seed, cache=cache)
+    results = run_in_order(job, plan.taken, stage.workers, stage.executor)
+    shown = progress(results, len(plan.taken), "objects: convex parts", "object")
+    return [replace(item, family=plan.families.of[item.name]) for item in shown]
 
 
 def finished(

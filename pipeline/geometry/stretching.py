@@ -8,6 +8,46 @@ from pipeline.config.objects import ObjectsConfig
 from pipeline.errors import MeshError
 from pipeline.geometry.catalogue import CatalogueObject, stretched_copy
 from pipeline.geometry.descriptor import ShapeDescriptor, describe, shape_distance
+from pipeline.geometry.plan import Plan
+
+
+def stretched_for_training(
+    items: Sequence[CatalogueObject],
+    plan: Plan,
+    config: ObjectsConfig,
+    rng_of: Callable[[str], np.random.Generator],
+    threshold: float,
+) -> tuple[list[CatalogueObject], dict[str, str]]:
+    """The training objects' stretched copies that are unlike every held-out object.
+
+    Parameters
+    ----------
+    items
+        The catalogue's objects.
+    plan
+        Which of them are for training, and which are held out.
+    config
+        How many copies, and how far they are stretched.
+    rng_of
+        The random stream of one copy, by its object's content and its number.
+    threshold
+        Shapes nearer than this are near-copies [1].
+
+    Returns
+    -------
+    The copies, in the order of their objects; and of those left out, by name, the held-out object
+    that they are like.
+
+    Raises
+    ------
+    MeshError
+        A copy would have the name of an object.
+    """
+    training = [item for item in items if plan.split[item.name] == "train"]
+    copies = stretched_copies(training, plan.measured, config, rng_of)
+    held_out = {name: item.descriptor for name, item in plan.held_out.items()}
+    near = near_held_out(copies, held_out, threshold)
+    return [item for item in copies if item.name not in near], near
 
 
 def stretched_copies(

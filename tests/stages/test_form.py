@@ -2,13 +2,11 @@
 
 import ast
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 STAGES = sorted((Path(__file__).parents[2] / "stages").glob("*.py"))
 MOST_LINES = 200
-STILL_LONG = {"objects"}  # a name goes when its stage has become short
 # What computes, compiles, learns, simulates or draws. NumPy may stay: a stage picks rows of arrays
 # and joins them, to hand them on.
 OF_SCIENCE = {"numba", "scipy", "torch", "trimesh", "sapien", "openvino", "rerun", "matplotlib"}
@@ -22,13 +20,7 @@ def imported(path: Path) -> set[str]:
     return {name.partition(".")[0] for name in whole | parts}
 
 
-def short_or_not_yet(path: Path) -> Any:
-    """A stage as a parameter; one that is still too long may fail."""
-    marks = [pytest.mark.xfail(reason="still too long")] if path.stem in STILL_LONG else []
-    return pytest.param(path, id=path.stem, marks=marks)
-
-
-@pytest.mark.parametrize("stage", [short_or_not_yet(stage) for stage in STAGES])
+@pytest.mark.parametrize("stage", STAGES, ids=lambda path: path.stem)
 def test_a_stage_is_short(stage: Path) -> None:
     assert len(stage.read_text().splitlines()) <= MOST_LINES
 

@@ -1,0 +1,111 @@
+"""The plan of a catalogue: which of the measured objects a run takes, and into which split."""
+
+import difflib
+from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+
+from pipeline.config.objects import ObjectsConfig, SplitConfig
+from pipeline.errors import ConfigError, MeshError
+from pipeline.geometry.catalogue import MeasuredObject
+from pipeline.geometry.families import DeclaredFamily, Families
+from pipeline.geometry.selection import Split, choose_subset
+from pipeline.geometry.settled import Settled
+from pipeline.geometry.splits import split_objects
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """What becomes of each measured object."""
+
+    measured: dict[str, MeasuredObject]
+    """All that could be measured, by name, in the order they were given."""
+    split: dict[str, Split]
+    """Split of each object that is taken."""
+    families: Families
+    settled: Settled
+    """What the run stays with from now on."""
+
+    @property
+    def taken(self) -> list[MeasuredObject]:
+        """The objects of the catalogue, in the order they were given."""
+        return [item for name, item in self.measured.items() if name in self.split]
+
+    @property
+    def left_out(self) -> list[tuple[str, MeshError]]:
+        """Sources of objects that would join two splits, and why."""
+        joining = self.families.joining
+        return [(self.measured[name].source.label, why) for name, why in joining.items()]
+
+    @property
+    def held_out(self) -> dict[str, MeasuredObject]:
+        """The objects that are not for training, by name."""
+        return {name: self.measured[name] for name, s in self.split.items() if s != "train"}
+
+
+def plan_catalogue(
+    items: Sequence[MeasuredObject],
+    added: AbstractSet[str],
+    declared: Sequence[DeclaredFamily],
+    configs: tuple[ObjectsConfig, SplitConfig],
+    seed: int,
+    settled: Settled,
+) -> Plan:
+    """Choose the objects of a run, group them into families and split these.
+
+    Parameters
+    ----------
+    items
+        The measured objects.
+    added
+        Names of those that stand beside meshes, for training alone.
+    declared
+        Families that a person declared.
+    configs
+        How many objects are taken; how they are split.
+    seed
+        Of the draws.
+    settled
+        What an earlier making of the run decided.
+
+    Returns
+    -------
+    The plan.
+
+    Raises
+    ------
+    MeshError
+        There is no object.
+    ConfigError
+        A pattern of ``objects.transparent`` fits no object, or settled splits do not agree with
+        the families.
+    """
+    config, splitting = configs
+    measured = {item.source.name: item for item in items}
+    classes = {name: item.shape_class for name, item in measured.items() if name not in added}
+    if not classes:
+        raise MeshError("Not one mesh could be used", "See the reasons above, or unset MESH_DIR")
+    check_transparent(config, sorted(measured))
+    taken = {*choose_subset(classes, config.limit, seed), *added}
+    split, families = split_objects(
+        [item for name, item in measured.items() if name in taken],
+        added & measured.keys(),
+        declared,
+        splitting,
+        seed,
+        settled,
+    )
+    now = settled.with_splits({measured[name].content: where for name, where in split.items()})
+    return Plan(measured, split, families, now)
+
+
+def check_transparent(config: ObjectsConfig, names: list[str]) -> None:
+    """Raise ConfigError for a pattern of ``objects.transparent`` that no object has."""
+    for pattern in config.transparent:
+        if not any(fnmatchcase(name, pattern) for name in names):
+            near = difflib.get_close_matches(pattern, names, n=3) or names[:3]
+            raise ConfigError(
+                f"objects.transparent names {pattern!r}, and no object is called so",
+                f"Names are, for instance: {', '.join(near)}",
+            )
