@@ -128,6 +128,12 @@ class EvaluateConfig(Section):
     arm: ArmConfig = ArmConfig()
     policy: PolicyConfig = PolicyConfig()
 
+    @model_validator(mode="after")
+    def _tug_is_part_of_the_lift(self) -> Self:
+        if self.policy.tug_rg > self.lift.height_rg:
+            raise ValueError("policy.tug_rg must not exceed lift.height_rg, whose first part it is")
+        return self
+
 
 class RecordingConfig(Section):
     """How much of a stage is shown; recordings are samples, artifacts are whole.

@@ -11,6 +11,8 @@ CELL_SIDE = 0.1  # side of a sub cloud's cell in units of r_G: 60 mm in 24 cells
 
 SMALLEST_PAD_M, LARGEST_PAD_M = 0.002, 1.0  # r_G of suction pads, from a needle's to a table's
 
+MOST_VERTICES = 50_000  # a label of such a pad takes seconds; Table I's has 586
+
 SolverName = Literal["structured", "piqp-sparse", "piqp-dense", "clarabel"]
 
 
@@ -47,9 +49,18 @@ class PadConfig(Section):
     )
 
     @model_validator(mode="after")
-    def _seal_inside_pad(self) -> Self:
+    def _grid_is_fine_enough_and_fits_memory(self) -> Self:
         if self.seal_radius_rg > 1:
             raise ValueError("seal_radius_rg must not exceed 1, which is r_G itself")
+        for name in ("distance_step_rg", "contact_tolerance_rg"):
+            if getattr(self, name) > self.altitude_rg:
+                raise ValueError(f"{name} must not exceed altitude_rg")
+        vertices = 2 * math.pi / self.rotation_step_rad / self.radius_step_rg
+        if vertices > MOST_VERTICES:
+            raise ValueError(
+                f"rotation_step_rad and radius_step_rg make a pad of {vertices:.3g} vertices, "
+                f"and it may have {MOST_VERTICES}"
+            )
         return self
 
 

@@ -6,6 +6,8 @@ from pydantic import Field
 
 from pipeline.config.section import Section
 
+# Supplement IV: depths from 18 to 102; a block has two layers, so they are even.
+Layers = Annotated[int, Field(ge=18, le=102, multiple_of=2)]
 _Channels = Annotated[int, Field(ge=2, le=8192)]
 StageChannels = tuple[_Channels, _Channels, _Channels, _Channels]
 
@@ -21,7 +23,7 @@ class ShardsConfig(Section):
 class NetworkConfig(Section):
     """GA-CNN: a two-layer stem and four attention stages; Supplement IV."""
 
-    layers: int = Field(18, ge=18, le=102, description="weighted layers; Supplement IV: 52")
+    layers: Layers = Field(18, description="weighted layers; Supplement IV: 52")
     channels: StageChannels = Field(
         (16, 32, 64, 128), description="channels of the four stages; IV: 64-128-256-512"
     )
@@ -51,7 +53,7 @@ class TrainConfig(Section):
 class SweepConfig(Section):
     """The family compared, Fig. 1, and what attention and symmetry buy: one budget for all."""
 
-    depths: tuple[int, ...] = Field(
+    depths: tuple[Layers, ...] = Field(
         (18, 24, 30, 38, 44, 52, 58, 66, 72, 80, 86, 94, 102),
         min_length=1,
         description="weighted layers; IV: from 18 to 102",

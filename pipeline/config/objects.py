@@ -6,6 +6,8 @@ from pydantic import Field, model_validator
 
 from pipeline.config.section import LengthInMetres, ScaledSection, Section
 
+FEWEST_OBJECTS = 3  # one each for train, val and test
+
 
 class ConvexPartsConfig(Section):
     """Convex decomposition (CoACD) for collision shapes."""
@@ -71,6 +73,8 @@ class ObjectsConfig(ScaledSection):
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
+        if 0 < self.limit < FEWEST_OBJECTS:
+            raise ValueError(f"limit must be 0 or at least {FEWEST_OBJECTS}: one object a split")
         if self.min_extent_m > self.max_extent_m:
             raise ValueError("min_extent_m must not exceed max_extent_m")
         if self.target_extent_min_rg > self.target_extent_max_rg:

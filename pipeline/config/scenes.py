@@ -10,9 +10,9 @@ from pipeline.config.section import LengthInMetres, ScaledSection, Section
 class ClutterCounts(Section):
     """Clutters built per level, by the split their objects come from."""
 
-    train: int = Field(3, ge=0)
-    val: int = Field(1, ge=0)
-    test: int = Field(1, ge=0, description="also the clutters of the closed-loop evaluation")
+    train: int = Field(3, ge=1, description="clutters a level of training objects")
+    val: int = Field(1, ge=1, description="clutters a level of validation objects")
+    test: int = Field(1, ge=1, description="also the clutters of the closed-loop evaluation")
 
 
 class ScenesConfig(ScaledSection):

@@ -103,6 +103,19 @@ class RunConfig(Section):
         return self
 
     @model_validator(mode="after")
+    def _wrist_sees_what_it_looks_at(self) -> Self:
+        hand, camera = self.evaluate.hand, self.cameras.wrist
+        above_m = hand.camera_above_m + self.evaluate.policy.wrist_view_m
+        away_m = math.hypot(hand.camera_aside_m, above_m)
+        if not camera.near_m < away_m < camera.far_m:
+            raise ValueError(
+                f"evaluate.policy.wrist_view_rg puts the wrist's camera {away_m:g} m from what it "
+                f"looks at, and it measures from cameras.wrist.near_m = {camera.near_m:g} to "
+                f"far_m = {camera.far_m:g}"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _clouds_show_what_labels_meet(self) -> Self:
         if self.sensing.grid_height_rg < self.grasps.clearance_rg:
             raise ValueError(

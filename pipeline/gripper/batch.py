@@ -117,7 +117,8 @@ def label_batch(
 
     Notes
     -----
-    Compiled for the structured solver; any other runs the reference, grasp by grasp.
+    Compiled for the structured solver; any other runs the reference, grasp by grasp. So does PIQP
+    where the structured solver ends in rounding and gives no number.
     """
     heights = np.ascontiguousarray(heights_m, dtype=np.float64)
     target_mask = np.ascontiguousarray(on_target, dtype=np.bool_)
@@ -193,6 +194,10 @@ def label_batch(
             batch.slacks[rows],
             batch.weights[rows],
         )
+    # Problems a thousandfold off the usual scale may end the structured solver in rounding.
+    careful = config.model_copy(update={"solver": "piqp-dense"})
+    for row in np.flatnonzero(~np.isfinite(batch.q)).tolist():
+        _store(batch, row, label_reference(pad, careful, heights[row], target_mask[row]))
     return batch
 
 

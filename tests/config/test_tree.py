@@ -60,6 +60,16 @@ def test_table_one_is_the_default_pad() -> None:
         ("[evaluate.policy]\ncommit_rg=9", r"commit_rg must be less than standoff_rg"),
         ("[evaluate.policy.motion]\nrefresh_cells=50", r"must not exceed reach_cells"),
         ("[sensing]\nr_g_m=0.03", r"r_g_m follows gripper\.pad\.radius_m"),
+        ("[gripper.pad]\ndistance_step_rg=5", r"distance_step_rg must not exceed altitude_rg"),
+        ("[gripper.pad]\nradius_step_rg=1e-5", r"a pad of 4\.44e\+06 vertices"),
+        ("[evaluate.policy]\ntug_rg=50", r"tug_rg must not exceed lift\.height_rg"),
+        (
+            "cameras.wrist.near_m=0.3\nevaluate.policy.wrist_view_rg=2.1",
+            r"wrist.s camera 0\.28\d* m",
+        ),
+        ("[network]\nlayers=19", r"'network\.layers' = 19.*multiple of 2"),
+        ("[objects]\nlimit=2", r"limit must be 0 or at least 3"),
+        ("[scenes.clutters_per_level]\nval=0", r"clutters_per_level\.val' = 0"),
         ("[sensing]\ngrid_cells=32", r"grid_side_rg / grid_cells is 0\.075, .* cells of 0\.1"),
     ],
 )

@@ -317,3 +317,19 @@ def test_labels_do_not_depend_on_how_they_are_batched() -> None:
     apart = [label(PAD, CONFIG, one, mask) for one, mask in zip(heights, on_target, strict=True)]
     assert [one.q for one in apart] == together.q.tolist()
     np.testing.assert_array_equal(np.stack([one.wrench for one in apart]), together.wrench)
+
+
+def test_a_problem_far_off_the_usual_scale_has_the_answer_of_another_solver() -> None:
+    """Where the structured solver ends in rounding, as it may here, PIQP answers in its place."""
+    pad_config = PadConfig(rotation_step_rad=0.0495 * math.pi)
+    far_off = {
+        "pad": pad_config,
+        "friction": 5e-4,
+        "weight_spread": 1e-4,
+        "quality_scale": SCALE / 1000,
+    }
+    pad = build_pad(pad_config)
+    heights = sphere(pad, 2.4 * pad.radius_m)
+    found = label(pad, GripperConfig(**far_off), heights, everywhere(pad))
+    other = label(pad, GripperConfig(**far_off, solver="clarabel"), heights, everywhere(pad))
+    assert found.q == pytest.approx(other.q, abs=1e-6)
