@@ -26,7 +26,8 @@ from pipeline.geometry.catalogue import (
     measure_object,
 )
 from pipeline.geometry.families import DeclaredFamily, read_declared
-from pipeline.geometry.mesh_folders import FAMILIES_FILE, object_names
+from pipeline.geometry.mesh_folders import FAMILIES_FILE
+from pipeline.geometry.object_names import readable_name
 from pipeline.geometry.parametric import PARAMETRIC_OBJECTS, parametric_source
 from pipeline.geometry.plan import Plan, plan_catalogue
 from pipeline.geometry.selection import Split
@@ -38,7 +39,7 @@ from pipeline.recording.objects import draw_objects
 from schemas.softgrip.v1.objects_pb2 import RefusedMesh
 from stages.graph import OBJECTS, inputs_of
 
-Source = tuple[Path | None, str]  # a mesh file, or None for an embedded object, and its name
+Source = tuple[Path | None, str]  # a mesh file and its path in its folder, or an embedded name
 
 
 def build(stage: StageContext) -> Summary:
@@ -85,12 +86,13 @@ def sources(stage: StageContext) -> tuple[list[Source], frozenset[str]]:
     if folder is None:
         return embedded, frozenset()
     paths = [path for name, path in stage.inputs.items() if name.startswith("meshes/")]
-    names = object_names(standalone(paths, folder), folder)
-    meshes: list[Source] = [(path, name) for path, name in names.items()]
+    meshes: list[Source] = [
+        (path, path.relative_to(folder).as_posix()) for path in standalone(paths, folder)
+    ]
     if not stage.config.objects.embedded_in_training:
         return meshes, frozenset()
-    for path, name in names.items():
-        if name in PARAMETRIC_OBJECTS:
+    for path, label in meshes:
+        if readable_name(label) in PARAMETRIC_OBJECTS:
             raise MeshError(
                 f"{path} has the name of an embedded object",
                 "Rename the file, or set objects.embedded_in_training = false",

@@ -1,14 +1,29 @@
 """Names in messages that become names of files: none leads out of a folder."""
 
-import re
+import unicodedata
 
 from pipeline.errors import ContentError
 
-_FILE_NAME = re.compile(r"[a-z0-9_-]{1,240}")
+LONGEST_BYTES = 240  # in UTF-8: a file's name may have 255, and exports add their ending
+
+
+def belongs_in_name(char: str) -> bool:
+    """Whether a character may stand in a name: a letter, mark or digit of any script, _ or -.
+
+    Parameters
+    ----------
+    char
+        One character.
+
+    Returns
+    -------
+    False for blanks, punctuation, signs, and what is not seen.
+    """
+    return char in "_-" or unicodedata.category(char)[0] in "LMN"
 
 
 def file_name(name: str) -> str:
-    """Return ``name`` if it is fit for a file: lower-case letters, digits, ``_`` and ``-``.
+    """Return ``name`` if it is fit for a file, on every file system.
 
     Parameters
     ----------
@@ -17,13 +32,15 @@ def file_name(name: str) -> str:
 
     Returns
     -------
-    The same name.
+    The same name: letters of any script in lower case and composed (NFC), digits, ``_`` and ``-``.
 
     Raises
     ------
     ContentError
-        It holds anything else, as ``../x`` does, or is empty.
+        It holds anything else, as ``../x`` does, is too long or empty.
     """
-    if not _FILE_NAME.fullmatch(name):
+    fit = all(belongs_in_name(char) for char in name)
+    fit = fit and name == unicodedata.normalize("NFC", name.lower())
+    if not fit or not 0 < len(name.encode()) <= LONGEST_BYTES:
         raise ContentError(f"{name[:80]!r} is no name of an object or a scene")
     return name

@@ -1,7 +1,6 @@
 """The object catalogue: from a source mesh to everything later stages need of an object."""
 
 from dataclasses import dataclass, replace
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Literal
 
@@ -14,6 +13,7 @@ from pipeline.geometry.convex_parts import convex_parts
 from pipeline.geometry.descriptor import ShapeDescriptor, describe
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.mesh_files import MeshSource, UnitSource
+from pipeline.geometry.object_names import is_named
 from pipeline.geometry.repair import repair
 from pipeline.geometry.rescaling import draw_stretch, draw_target_extent, rescale
 from pipeline.geometry.shape import (
@@ -45,6 +45,15 @@ class MeasuredObject:
     def content(self) -> str:
         """What the object is known by, whatever it is called."""
         return content_of(self.source.name, self.source.sha256)
+
+    @property
+    def embedded(self) -> bool:
+        """Whether it is of the embedded set, and no file's."""
+        return self.source.sha256 == EMBEDDED
+
+    def called(self, name: str) -> "MeasuredObject":
+        """The same object under another name."""
+        return replace(self, source=replace(self.source, name=name))
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,7 +198,7 @@ def _target_extent_m(mesh: Mesh, config: ObjectsConfig, rng: np.random.Generator
 
 def material_of(name: str, config: ObjectsConfig) -> Material:
     """Transparent where a pattern of ``objects.transparent`` matches the object's name."""
-    matched = any(fnmatchcase(name, pattern) for pattern in config.transparent)
+    matched = any(is_named(name, pattern) for pattern in config.transparent)
     return "transparent" if matched else "opaque"
 
 

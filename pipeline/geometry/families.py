@@ -7,11 +7,11 @@ is never in two splits.
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 from pathlib import Path
 
 from pipeline.errors import ConfigError, MeshError
 from pipeline.geometry.descriptor import ShapeDescriptor, shape_distance
+from pipeline.geometry.object_names import is_named
 from pipeline.geometry.selection import Split
 
 
@@ -25,7 +25,7 @@ class DeclaredFamily:
 
     def has(self, name: str) -> bool:
         """Whether an object of that name is declared a member."""
-        return any(fnmatchcase(name, pattern) for pattern in self.patterns)
+        return any(is_named(name, pattern) for pattern in self.patterns)
 
 
 @dataclass(frozen=True)

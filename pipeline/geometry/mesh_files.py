@@ -29,7 +29,7 @@ class MeshSource:
     """A mesh as it came, in metres, and where it came from."""
 
     name: str
-    """Name of the object: a slug, unique in its folder."""
+    """Name of the object."""
     label: str
     """What a person calls the source: the file's path in its folder, or `parametric`."""
     sha256: str

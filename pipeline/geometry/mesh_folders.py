@@ -3,7 +3,7 @@
 Apart from their reading: Make asks for the list at every call, and should not wait for parsers.
 """
 
-import re
+import os
 from pathlib import Path
 
 from pipeline.errors import MeshError
@@ -18,7 +18,7 @@ def list_mesh_files(folder: Path) -> list[Path]:
 
     Known suffixes only, hidden files and folders left out. Links are listed where they lead to a
     file inside the folder and left out where they lead outside; linked folders are not entered.
-    Raises MeshError where the folder is missing or holds no mesh.
+    Raises MeshError where the folder is missing, holds no mesh, or a file's name is no text.
     """
     if not folder.is_dir():
         raise MeshError(f"{folder} is not a folder", "Point MESH_DIR at a folder of meshes")
@@ -35,17 +35,15 @@ def list_mesh_files(folder: Path) -> list[Path]:
         raise MeshError(
             f"{folder} holds no mesh file", f"Put files of {', '.join(SOURCE_SUFFIXES)} there"
         )
+    for path in found:
+        if _no_text(path):
+            raise MeshError(
+                f"{folder} holds a file whose name is not UTF-8: {_no_text(path)}", "Rename it"
+            )
     return sorted(found, key=lambda path: path.relative_to(folder).as_posix())
 
 
-def object_names(files: list[Path], folder: Path) -> dict[Path, str]:
-    """A slug for each file from its path in the folder; equal slugs get -2, -3 in file order."""
-    names: dict[Path, str] = {}
-    for path in files:
-        stem = path.relative_to(folder).with_suffix("").as_posix()
-        slug = re.sub(r"[^a-z0-9_-]+", "_", stem.lower()).strip("_") or "object"
-        name, number = slug, 2
-        while name in names.values():
-            name, number = f"{slug}-{number}", number + 1
-        names[path] = name
-    return names
+def _no_text(path: Path) -> str:
+    """The name of a file with the bytes that are no UTF-8 written as numbers; else nothing."""
+    written = os.fsencode(path.name).decode(errors="backslashreplace")
+    return "" if written == path.name else written

@@ -4,12 +4,12 @@ import difflib
 from collections.abc import Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 
 from pipeline.config.objects import ObjectsConfig, SplitConfig
 from pipeline.errors import ConfigError, MeshError
 from pipeline.geometry.catalogue import MeasuredObject
 from pipeline.geometry.families import DeclaredFamily, Families
+from pipeline.geometry.object_names import distinct_names, is_named
 from pipeline.geometry.selection import Split, choose_subset
 from pipeline.geometry.settled import Settled
 from pipeline.geometry.splits import split_objects
@@ -57,7 +57,7 @@ def plan_catalogue(
     Parameters
     ----------
     items
-        The measured objects.
+        The measured objects; those of meshes have no name yet but their file's path.
     added
         Names of those that stand beside meshes, for training alone.
     declared
@@ -82,7 +82,10 @@ def plan_catalogue(
         the families.
     """
     config, splitting = configs
-    measured = {item.source.name: item for item in items}
+    meshes = {item.source.label: item for item in items if not item.embedded}
+    names = distinct_names(meshes, settled.names)
+    measured = {names[label]: item.called(names[label]) for label, item in meshes.items()}
+    measured |= {item.source.name: item for item in items if item.embedded}
     classes = {name: item.shape_class for name, item in measured.items() if name not in added}
     if not classes:
         raise MeshError("Not one mesh could be used", "See the reasons above, or unset MESH_DIR")
@@ -97,13 +100,14 @@ def plan_catalogue(
         settled,
     )
     now = settled.with_splits({measured[name].content: where for name, where in split.items()})
+    now = now.with_names(names)
     return Plan(measured, split, families, now)
 
 
 def check_transparent(config: ObjectsConfig, names: list[str]) -> None:
     """Raise ConfigError for a pattern of ``objects.transparent`` that no object has."""
     for pattern in config.transparent:
-        if not any(fnmatchcase(name, pattern) for name in names):
+        if not any(is_named(name, pattern) for name in names):
             near = difflib.get_close_matches(pattern, names, n=3) or names[:3]
             raise ConfigError(
                 f"objects.transparent names {pattern!r}, and no object is called so",

@@ -1,11 +1,12 @@
-"""What a run has settled about its objects and stays with when meshes are added: their splits.
+"""What a run has settled about its objects and stays with when meshes are added.
 
-Beside the run's artifacts; it holds as long as the run's seed and way of splitting do.
+Beside the run's artifacts. Splits hold as long as the run's seed and way of splitting do, names
+for good.
 """
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import cast, get_args
 
@@ -17,25 +18,33 @@ SETTLED_FILE = "objects.settled.json"
 
 @dataclass(frozen=True)
 class Settled:
-    """What was decided when an object first came, by its content."""
+    """What was decided when an object first came."""
 
     basis: str
-    """Digest of what the decisions rest on: with another, all is settled anew."""
+    """Digest of what the splits rest on: with another, all objects are split anew."""
     splits: dict[str, Split] = field(default_factory=dict)
     """SHA-256 of an object's source → its split."""
+    names: dict[str, str] = field(default_factory=dict)
+    """Path of an object's file in the mesh folder → its name."""
 
     def to_json(self) -> str:
         """As text, the same for the same decisions."""
-        record = {"basis": self.basis, "splits": self.splits}
+        record = {"basis": self.basis, "splits": self.splits, "names": self.names}
         return json.dumps(record, indent=1, sort_keys=True, ensure_ascii=False) + "\n"
 
     def with_splits(self, splits: Mapping[str, Split]) -> "Settled":
         """These and further splits; one that is settled stays, though its object be gone today."""
-        return Settled(self.basis, {**splits, **self.splits})
+        return replace(self, splits={**splits, **self.splits})
+
+    def with_names(self, names: Mapping[str, str]) -> "Settled":
+        """These names too. A file that is gone today keeps its name until another has it."""
+        taken = set(names.values())
+        kept = {label: name for label, name in self.names.items() if name not in taken}
+        return replace(self, names={**kept, **names})
 
 
 def read_settled(path: Path, basis: str) -> Settled:
-    """What is settled already; nothing where there is no such file or it rests on other grounds.
+    """What is settled already; no splits where they rest on other grounds.
 
     Parameters
     ----------
@@ -58,11 +67,11 @@ def read_settled(path: Path, basis: str) -> Settled:
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
         known = {str(digest): str(where) for digest, where in record["splits"].items()}
+        names = {str(at): str(name) for at, name in record.get("names", {}).items()}
         stands = record["basis"] == basis
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise ConfigError(
             f"{path} is damaged ({error})", "Delete it: the run's objects are then split anew"
         ) from error
-    if not stands:
-        return Settled(basis)
-    return Settled(basis, {d: cast(Split, w) for d, w in known.items() if w in get_args(Split)})
+    splits = {d: cast(Split, w) for d, w in known.items() if stands and w in get_args(Split)}
+    return Settled(basis, splits, names)

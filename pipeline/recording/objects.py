@@ -93,7 +93,7 @@ def show_catalogue(
     for index, (item, split) in enumerate(sorted(items, key=lambda pair: pair[0].nsvr)):
         place = SPACING_M * np.array([index % columns, -(index // columns), 0.0])
         colour = colours.SHAPE_CLASS[item.shape_class]
-        path = f"world/catalogue/{item.name}"
+        path = f"world/catalogue/{rr.escape_entity_path_part(item.name)}"
         stream.log(path, shown_mesh(item.mesh, colour), static=True)
         stream.log(path, rr.Transform3D(translation=place), static=True)
         stream.log(

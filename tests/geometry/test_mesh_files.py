@@ -1,5 +1,6 @@
 """Every bad file gets one sentence with its name; good ones come in metres."""
 
+import os
 import struct
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import trimesh
 from pipeline.config import ObjectsConfig
 from pipeline.errors import MeshError
 from pipeline.geometry.mesh_files import load_mesh_file
-from pipeline.geometry.mesh_folders import list_mesh_files, object_names
+from pipeline.geometry.mesh_folders import list_mesh_files
 
 CONFIG = ObjectsConfig()
 BOX = trimesh.creation.box(extents=(0.1, 0.05, 0.02))
@@ -156,6 +157,8 @@ def test_a_folder_without_meshes_is_an_error(tmp_path: Path) -> None:
         list_mesh_files(tmp_path / "absent")
 
 
-def test_equal_slugs_are_numbered(tmp_path: Path) -> None:
-    files = [tmp_path / "My Cup.stl", tmp_path / "my_cup.ply", tmp_path / "x.off"]
-    assert list(object_names(files, tmp_path).values()) == ["my_cup", "my_cup-2", "x"]
+def test_a_file_name_that_is_no_text_is_an_error(tmp_path: Path) -> None:
+    BOX.export(tmp_path / "good.ply")
+    (tmp_path / os.fsdecode(b"caf\xe9.ply")).write_bytes(b"")
+    with pytest.raises(MeshError, match=r"name is not UTF-8: caf\\xe9\.ply"):
+        list_mesh_files(tmp_path)

@@ -9,7 +9,7 @@ import trimesh
 from pipeline.config import ObjectsConfig
 from pipeline.errors import MeshError
 from pipeline.geometry.catalogue import finish_object, measure_object
-from pipeline.geometry.mesh_folders import list_mesh_files, object_names
+from pipeline.geometry.mesh_folders import list_mesh_files
 from pipeline.geometry.shape import volume
 from pipeline.geometry.urdf_files import load_object_file, standalone
 
@@ -97,7 +97,6 @@ def test_a_placed_mesh_is_no_object_of_its_own(folder: Path) -> None:
     files = list_mesh_files(folder)
     assert len(files) == 3
     assert [path.name for path in standalone(files, folder)] == ["alone.obj", "thing.urdf"]
-    assert sorted(object_names(standalone(files, folder), folder).values()) == ["alone", "thing"]
 
 
 def test_an_object_may_keep_its_own_size(folder: Path, tmp_path: Path) -> None:

@@ -4,12 +4,14 @@ from pathlib import Path
 
 import pytest
 import trimesh
+from rerun.chunk import RrdReader
 
 from pipeline.errors import ConfigError, MeshError
 from pipeline.execution import RunFolder, StageContext
 from pipeline.execution.staleness import stage_context
 from pipeline.geometry.parametric import PARAMETRIC_OBJECTS
 from pipeline.messages.objects import read_objects
+from pipeline.recording.objects import draw_objects
 from stages import objects
 from stages.graph import OBJECTS, inputs_of
 
@@ -107,6 +109,34 @@ def test_no_family_stands_in_two_splits_and_splits_stay(tmp_path: Path, mesh_dir
         assert second[name][0].mesh.vertices_m.tobytes() == first[name][0].mesh.vertices_m.tobytes()
 
 
+def test_names_in_any_script_stay_through_files_recordings_and_added_meshes(
+    tmp_path: Path,
+) -> None:
+    folder = tmp_path / "meshes"
+    folder.mkdir()
+    for height, name in ((0.03, "звезда"), (0.04, "杯子"), (0.05, "カップ")):
+        trimesh.creation.box((0.1, 0.05, height)).export(folder / f"{name}.ply")
+    config = '[objects]\ntransparent = ["杯*"]\n[objects.convex]\ninput_faces = 200\n'
+    stage = context(tmp_path, folder, config)
+    figures = objects.build(stage)
+    first = {name: item for name, (item, _) in read_objects(stage.output).items()}
+    assert set(first) == {"звезда", "杯子", "カップ"} == set(figures["nsvr"])
+    assert figures["transparent"] == ["杯子"]
+    draw_objects(stage, figures)
+    chunks = RrdReader(str(stage.recording)).stream()
+    drawn = {str(chunk.entity_path) for chunk in chunks}
+    assert {f"/world/catalogue/{name}" for name in first} <= drawn
+    for added in ("object", "аист", "Звезда_2", "звезда 2"):
+        trimesh.creation.capsule(0.1, 0.01 + 0.001 * len(added)).export(folder / f"{added}.ply")
+    again = stage_context(OBJECTS, stage.folder, inputs_of, folder, workers=1)
+    objects.build(again)
+    second = {name: item for name, (item, _) in read_objects(again.output).items()}
+    assert len(second) == 7
+    for name, item in first.items():
+        assert second[name].source == item.source
+        assert second[name].mesh.vertices_m.tobytes() == item.mesh.vertices_m.tobytes()
+
+
 def test_families_are_declared_in_a_file_that_run_toml_names(
     tmp_path: Path, mesh_dir: Path
 ) -> None:
@@ -124,7 +154,7 @@ def test_a_run_takes_meshes_or_embedded_objects_unless_told_otherwise(
     tmp_path: Path, mesh_dir: Path
 ) -> None:
     jobs, added = objects.sources(context(tmp_path / "a", mesh_dir, ""))
-    assert sorted(name for _, name in jobs) == [f"box_{number}" for number in range(7)]
+    assert sorted(name for _, name in jobs) == [f"box_{number}.ply" for number in range(7)]
     assert not added
     jobs, added = objects.sources(context(tmp_path / "b", None, BESIDE))
     assert {name for _, name in jobs} == set(PARAMETRIC_OBJECTS)
