@@ -1,8 +1,7 @@
 """`make referee`: the label, and what else scores grasps, against what the referee finds borne.
 
-Scenes and grasps are made in a run of their own, ``runs/<run>/referee``, nothing of the run is.
-There: referee.summary.json, .md, .csv (a line a grasp), calibration.svg, and referee.rrd, which
-shows where label and referee disagree most.
+All is made in a run of its own, ``runs/<run>/referee``: referee.summary.json, .md, .csv (a line a
+grasp), calibration.svg, and referee.rrd of grasps that label and referee see most differently.
 """
 
 import json
@@ -24,6 +23,7 @@ from pipeline.execution import RunFolder, generator, progress, run_command, run_
 from pipeline.messages.grasp_columns import GraspColumns, read_columns
 from pipeline.messages.scenes import read_placed
 from pipeline.network.analytic import fit_analytic
+from pipeline.network.sources import RELEASED, quality_source
 from pipeline.recording.recording import recording
 from pipeline.recording.referee import blueprint, show_seals, shown_seal
 from pipeline.referee import judging
@@ -33,7 +33,7 @@ from pipeline.reporting.agreement import as_csv, as_markdown
 from pipeline.reporting.plots import load_by_quality
 from pipeline.stopwatch import Stopwatch
 from pipeline.world.scene import PlacedObject
-from stages.evaluate import catalogue, network
+from stages.evaluate import SCORE_THREADS, catalogue, network
 from stages.graph import RUNS_DIR
 
 NAME = "referee"
@@ -42,7 +42,7 @@ Columns = dict[str, np.ndarray]
 
 @dataclass(frozen=True, eq=False)
 class SceneJob:
-    """One work item: chosen grasps of one scene, and which of them are varied too."""
+    """Chosen grasps of one scene, and which of them are varied too."""
 
     scene: int
     pose: np.ndarray
@@ -71,8 +71,9 @@ Workers = Annotated[int, typer.Option(envvar="WORKERS", min=1, help="worker proc
 
 @app.command()
 def prepare(run: RunName = "default", runs_dir: RunsDir = RUNS_DIR) -> None:
-    """Write the run.toml of the scenes and grasps that are judged."""
-    config = judged_config(load_run_config(RunFolder(runs_dir / run).config))
+    """Write the run.toml of the scenes and grasps that are judged; by defaults without a run's."""
+    own = RunFolder(runs_dir / run).config
+    config = judged_config(load_run_config(own) if own.is_file() else RunConfig())
     publish_bytes(RunFolder(runs_dir / run / NAME).config, as_toml(config).encode())
 
 
@@ -82,8 +83,8 @@ def judge(run: RunName = "default", workers: Workers = CORES, runs_dir: RunsDir 
     began = time.perf_counter()
     folder = RunFolder(runs_dir / run / NAME)
     config = load_run_config(folder.config)
-    wanted, rng = config.agreement, generator(config.seed, NAME)
-    grasps = read_columns(folder.artifact("grasps"))
+    wanted, grasps = config.agreement, read_columns(folder.artifact("grasps"))
+    rng = generator(config.seed, NAME)
     names, objects = np.unique(grasps.object_name, return_inverse=True)
     chosen = judging.chosen_evenly(grasps.quality, objects, wanted.grasps, rng)  # scene by scene
     again = judging.chosen_evenly(grasps.quality[chosen], objects[chosen], wanted.varied, rng)
@@ -98,14 +99,17 @@ def judge(run: RunName = "default", workers: Workers = CORES, runs_dir: RunsDir 
     ]
     done = run_in_order(judge_scene, jobs, workers)
     parts = list(progress(done, len(jobs), "referee: judged", "scene"))
-    found: Columns = {n: np.concatenate([part[0][n] for part in parts]) for n in parts[0][0]}
+    found, among_n = (
+        {name: np.concatenate([part[side][name] for part in parts]) for name in parts[0][side]}
+        for side in (0, 1)
+    )
     scores = {"q": grasps.quality[chosen], "p of Eq. (2)": grasps.pressure[chosen]}
     scores["label on the measured cloud"] = analytic(grasps, chosen, config)
-    scores |= predicted(RunFolder(runs_dir / run), grasps, chosen)
-    among_n = {name: np.concatenate([part[1][name] for part in parts]) for name in parts[0][1]}
+    scores |= predicted(RunFolder(runs_dir / run), grasps, chosen, config)
+    of_them = {name: score[among] for name, score in scores.items()}
     figures = {
         **figures_of(scores, found, objects[chosen], wanted, rng),
-        "varied": varied(scores["q"][among], found["borne_n"][among], among_n, wanted),
+        "varied": varied(of_them, found["borne_n"][among], among_n, wanted),
         "ms_a_grasp": 1e3 * float(found.pop("seconds").mean()),
         "wall_time_s": time.perf_counter() - began,
     }
@@ -119,11 +123,13 @@ def judge(run: RunName = "default", workers: Workers = CORES, runs_dir: RunsDir 
     sys.stdout.write(as_markdown(figures))
 
 
-def predicted(run: RunFolder, grasps: GraspColumns, rows: np.ndarray) -> Columns:
-    """The run's network, if it has one; and the same on objects it was not trained on."""
+def predicted(run: RunFolder, grasps: GraspColumns, rows: np.ndarray, config: RunConfig) -> Columns:
+    """The run's network, and that on objects it was not trained on; else the released one."""
+    cloud, mask = grasps.cloud[rows], grasps.cloud_mask[rows]
     if not run.artifact("train").is_file():
-        return {}
-    score = network(run.artifact("train")).predict(grasps.cloud[rows], grasps.cloud_mask[rows])
+        released = quality_source(RELEASED, config.gripper, SCORE_THREADS)
+        return {"q-hat, released network": released.predict(cloud, mask)}
+    score = network(run.artifact("train")).predict(cloud, mask)
     objects = catalogue(run.artifact("objects"))
     unseen = np.array([objects.get(n, (0, ""))[1] != "train" for n in grasps.object_name[rows]])
     return {"q-hat": score, "q-hat, unseen objects": np.where(unseen, score, np.nan)}
@@ -157,8 +163,8 @@ def judge_scene(job: SceneJob) -> tuple[Columns, Columns]:
     scene, _, bodies = scene_of(job)
     referee, radius_m, some = job.config.referee, job.config.gripper.pad.radius_m, job.varied
     began = time.process_time()
-    columns = dict(vars(judging.judged(referee, radius_m, scene, job.pose, bodies)))
-    columns["seconds"] = np.full(len(bodies), (time.process_time() - began) / len(bodies))
+    columns = {**vars(judging.judged(referee, radius_m, scene, job.pose, bodies))}
+    columns["seconds"] = (time.process_time() - began) / len(bodies) + np.zeros(len(bodies))
     return columns, {
         f"{name} x {factor:g}": judging.weights_borne_n(
             changed, radius_m, scene, job.pose[some], bodies[some]
@@ -180,17 +186,11 @@ def show(
         job = SceneJob(int(grasps.scene[row]), pose, body_id, one < 0, folder, config)
         scene, there, bodies = scene_of(job)
         seal = judging.sealed(config.referee, pad.disc.radius_m, scene, pose[0], int(bodies[0]))
-        shown.append(
-            shown_seal(
-                [objects[placed.object_name][0] for placed in there],
-                [placed.world_from_object for placed in there],
-                int(bodies[0]),
-                pose[0],
-                seal,
-                float(columns["borne_n"][number]),
-                {n: float(c[number]) for n, c in columns.items() if c.dtype.kind == "f"},
-            )
-        )
+        items = [objects[placed.object_name][0] for placed in there]
+        poses = [placed.world_from_object for placed in there]
+        scores = {n: float(c[number]) for n, c in columns.items() if c.dtype.kind == "f"}
+        borne_n = scores["borne_n"]
+        shown.append(shown_seal(items, poses, int(bodies[0]), pose[0], seal, borne_n, scores))
     key = read_provenance(folder.artifact("grasps")).key
     with recording(Recorded(folder.recording(NAME), key), blueprint()) as stream:
         show_seals(stream, shown, pad.disc, pad.fan.vacuum_pa)

@@ -92,7 +92,7 @@ def make_scenes(
 
 
 def scene_jobs(stage: StageContext) -> list[SceneJob]:
-    """Every clutter of the run, level by level."""
+    """Every clutter of the run, level by level; those without objects where they are refused."""
     counts = stage.config.scenes.clutters_per_level
     jobs = []
     for level in sorted(stage.config.scenes.levels):
@@ -111,25 +111,32 @@ def scene_jobs(stage: StageContext) -> list[SceneJob]:
                         stage.provenance(),
                     )
                 )
+    if stage.config.scenes.without_objects == "leave out":
+        return [job for job in jobs if pool_of(job)]
     return jobs
 
 
 def settled_clutter(job: SceneJob) -> ClutterScene:
     """One clutter at rest, without views."""
-    shape_class, _ = level_of(job.level)
-    pool = [
-        item
-        for item, split in catalogue(job.objects).values()
-        if split == job.split and item.shape_class == shape_class
-    ]
+    pool = pool_of(job)
     if not pool:
         raise SceneError(
-            f"Level {job.level} needs {shape_class} objects of the {job.split} split, "
+            f"Level {job.level} needs {level_of(job.level)[0]} objects of the {job.split} split, "
             f"and {job.objects} has none",
             "Add meshes, raise objects.limit, or leave the level out of scenes.levels",
         )
     seed = derive_seed(job.config.seed, "scene", job.scene_id)
     return build_clutter(job.scene_id, job.level, job.split, pool, job.config.scenes, seed)
+
+
+def pool_of(job: SceneJob) -> list[CatalogueObject]:
+    """The objects of its split and its level's class."""
+    shape_class, _ = level_of(job.level)
+    return [
+        item
+        for item, split in catalogue(job.objects).values()
+        if split == job.split and item.shape_class == shape_class
+    ]
 
 
 def render(job: SceneJob, scene: ClutterScene, clock: BusyClock) -> ClutterScene:

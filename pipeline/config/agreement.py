@@ -1,6 +1,8 @@
 """[agreement]: on what grasps the label is held against the referee."""
 
-from pydantic import Field
+from typing import Self
+
+from pydantic import Field, model_validator
 
 from pipeline.config.section import Section
 
@@ -24,3 +26,9 @@ class AgreementConfig(Section):
         (0.5, 1.0, 2.0, 4.0, 8.0), min_length=1, description="weights to be borne, for AUROC [N]"
     )
     resamples: int = Field(400, ge=0, description="bootstrap samples over objects, for intervals")
+
+    @model_validator(mode="after")
+    def _fits_to_others(self) -> Self:
+        if self.grasps + self.fitted > self.labelled:
+            raise ValueError("labelled must be at least grasps + fitted")
+        return self

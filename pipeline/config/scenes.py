@@ -1,6 +1,6 @@
 """[scenes]: clutter of the nine levels and how it comes to rest."""
 
-from typing import ClassVar, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -25,6 +25,9 @@ class ScenesConfig(ScaledSection):
         (1, 2, 3, 4, 5, 6, 7, 8, 9), min_length=1, description="clutter levels; Table II"
     )
     clutters_per_level: ClutterCounts = ClutterCounts()
+    without_objects: Literal["refuse", "leave out"] = Field(
+        "refuse", description="a level's clutters of a split that has no object of its class"
+    )
     objects_per_clutter: int = Field(10, ge=1, le=50, description="Supplement V: 10")
     isolated_gap_min_m: float = Field(0.05, gt=0, description="Supplement V: 5 cm [m]")
     multiple_gap_max_m: float = Field(0.01, gt=0, description="Supplement V: 1 cm [m]")

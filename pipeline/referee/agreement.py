@@ -132,17 +132,17 @@ def figures_of(
 
 
 def varied(
-    quality: Float[np.ndarray, " n"],
+    scores: Mapping[str, Float[np.ndarray, " n"]],
     as_configured_n: Float[np.ndarray, " n"],
     borne_n: Mapping[str, Float[np.ndarray, " n"]],
     config: AgreementConfig,
 ) -> dict[str, Any]:
-    """`agreement` of q as configured, and under each variation; the median borne beside it.
+    """`agreement` of every score as configured, and under each variation; the median beside it.
 
     Parameters
     ----------
-    quality
-        q, shape (n,).
+    scores
+        By name, each of shape (n,).
     as_configured_n
         What each grasp bears as configured, shape (n,) [N].
     borne_n
@@ -152,15 +152,18 @@ def varied(
 
     Returns
     -------
-    Figures by variation.
+    By variation: ``median_borne_n``, and ``scores`` with the figures of each.
     """
     each = {"as configured": as_configured_n, **borne_n}
-    every = np.zeros(len(quality), dtype=np.int64)
+    every = np.zeros(len(as_configured_n), dtype=np.int64)
     none = np.random.default_rng(0)  # draws nothing: no interval is asked for
     return {
         name: {
-            **agreement(quality, values, every, config.loads_n, 0, none),
             "median_borne_n": float(np.median(values)) if len(values) else None,
+            "scores": {
+                score: agreement(predicted, values, every, config.loads_n, 0, none)
+                for score, predicted in scores.items()
+            },
         }
         for name, values in each.items()
     }

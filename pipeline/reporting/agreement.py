@@ -19,7 +19,7 @@ def as_csv(columns: Mapping[str, np.ndarray]) -> str:
 
 
 def as_markdown(figures: Mapping[str, Any]) -> str:
-    """Tables of every score, of q by tenths, and of q under each variation."""
+    """Tables of every score, of q by tenths, and of all under each variation."""
     loads = list(figures["auroc"])
     lines = [
         f"{figures['grasps']} grasps of {figures['objects']} objects, "
@@ -35,10 +35,27 @@ def as_markdown(figures: Mapping[str, Any]) -> str:
         quartiles = ", ".join("none" if n is None else f"{n:.2f}" for n in row["quartiles_n"])
         low = row["tenth"] / 10
         lines.append(f"| {low:.1f} to {low + 0.1:.1f} | {row['count']} | {quartiles} |")
-    if figures["varied"]:
-        lines += ["", "q, where one figure of the referee is another:", "", *_head("figure", loads)]
-        lines += [_row(name, found, loads) for name, found in figures["varied"].items()]
+    lines += ["", *_varied(figures["varied"], loads)]
     return "\n".join(lines) + "\n"
+
+
+def _varied(varied: Mapping[str, Any], loads: list[str]) -> list[str]:
+    """Each score's rank correlation where one figure of the referee is another, and q's AUROC."""
+    names = list(varied["as configured"]["scores"])
+    heads = [f"Spearman, {name}" for name in names]
+    heads += [f"AUROC of q, bears {load} N" for load in loads]
+    lines = [
+        "Where one figure of the referee is another:",
+        "",
+        f"| figure | median borne [N] | {' | '.join(heads)} |",
+        "|-" * (2 + len(heads)) + "|",
+    ]
+    for figure, found in varied.items():
+        cells = [_figure(found["median_borne_n"])]
+        cells += [_figure(found["scores"][name]["spearman"]) for name in names]
+        cells += [_figure(found["scores"]["q"]["auroc"][load]) for load in loads]
+        lines.append(f"| {figure} | {' | '.join(cells)} |")
+    return lines
 
 
 def _head(first: str, loads: list[str]) -> tuple[str, str]:

@@ -65,6 +65,9 @@ def test_figures_have_the_names_that_others_rely_on() -> None:
     assert figures["grasps"] == 50
     assert figures["spearman"] == pytest.approx(1.0)
     assert figures["auroc"]["2"] == 1.0
-    again = varied(quality, found["borne_n"], {"half": 2 * quality}, config)
+    scores = {"q": quality, "p": 1 - quality}
+    again = varied(scores, found["borne_n"], {"half": 2 * quality}, config)
     assert list(again) == ["as configured", "half"]
     assert again["half"]["median_borne_n"] == pytest.approx(2 * np.median(quality))
+    assert again["half"]["scores"]["q"]["spearman"] == pytest.approx(1.0)
+    assert again["half"]["scores"]["p"]["spearman"] == pytest.approx(-1.0)

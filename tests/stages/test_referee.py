@@ -5,14 +5,17 @@ import json
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from pipeline.config import load_run_config
+from pipeline.config import RunConfig, load_run_config
+from pipeline.config.judged import judged_config
 from pipeline.config.written import as_toml
 from pipeline.execution import RunFolder
+from pipeline.messages.grasp_columns import read_columns
 from pipeline.recording.recording import TIMELINES
 from pipeline.recording.viewer import sight_of
-from stages.referee import judge, prepare
+from stages.referee import judge, predicted, prepare
 
 
 @pytest.fixture(scope="module")
@@ -41,6 +44,21 @@ def test_the_referees_run_has_scenes_of_its_own(made: RunFolder) -> None:
     assert made.cache == made.path.parent.parent / ".cache"
 
 
+def test_without_a_runs_own_toml_defaults_are_judged(tmp_path: Path) -> None:
+    prepare("new", tmp_path)
+    config = load_run_config(tmp_path / "new" / "referee" / "run.toml")
+    assert config == judged_config(RunConfig())
+    assert config.scenes.without_objects == "leave out"
+
+
+def test_without_a_network_the_released_one_is_asked(made: RunFolder) -> None:
+    config = load_run_config(made.config)
+    grasps = read_columns(made.artifact("grasps"))
+    found = predicted(made, grasps, np.arange(3), config)
+    assert list(found) == ["q-hat, released network"]
+    assert found["q-hat, released network"].shape == (3,)
+
+
 def test_figures_are_of_every_score(made: RunFolder) -> None:
     figures = json.loads(made.summary("referee").read_text())
     assert figures["grasps"] == 40
@@ -50,13 +68,15 @@ def test_figures_are_of_every_score(made: RunFolder) -> None:
     }
     assert figures["spearman"] == figures["scores"]["q"]["spearman"]
     assert set(figures["auroc"]) == {"0.5", "1", "2", "4", "8"}
-    assert figures["varied"]["as configured"]["grasps"] == 2
-    assert "friction x 2" in figures["varied"]
+    varied = figures["varied"]["friction x 2"]["scores"]
+    assert set(varied) == set(figures["scores"])
+    assert varied["q"]["grasps"] == 2
     rows = list(csv.DictReader((made.path / "referee.csv").open()))
     assert len(rows) == 40
     assert all(float(row["borne_n"]) >= 0 for row in rows)
     text = (made.path / "referee.md").read_text()
     assert "| q | 40 |" in text
+    assert "| friction x 2 | " in text
     assert "<svg" in (made.path / "calibration.svg").read_text()
 
 
