@@ -61,20 +61,26 @@ def checked(made: Any) -> Any:
 
 
 def _guarded(function: Callable[..., Any]) -> Callable[..., Any]:
-    # With typechecker=_check jaxtyping would check every argument twice. Its other way forgets the
-    # shapes that a generator's annotation shares with other functions, so there it is taken.
-    whole = inspect.isgeneratorfunction(function)
-    guard = (
-        jaxtyped(function, typechecker=_check)
-        if whole
-        else jaxtyped(_check(function), typechecker=None)
-    )
+    # Made at the first call: a program imports ten times as many functions as it calls.
+    made: list[Callable[..., Any]] = []
 
     @functools.wraps(function)
     def guarded(*args: Any, **kwargs: Any) -> Any:
-        return (function if _off else guard)(*args, **kwargs)
+        if _off:
+            return function(*args, **kwargs)
+        if not made:
+            made.append(_guard_of(function))
+        return made[0](*args, **kwargs)
 
     return guarded
+
+
+def _guard_of(function: Callable[..., Any]) -> Callable[..., Any]:
+    # With typechecker=_check jaxtyping would check every argument twice. Its other way forgets the
+    # shapes that a generator's annotation shares with other functions, so there it is taken.
+    if inspect.isgeneratorfunction(function):
+        return jaxtyped(function, typechecker=_check)
+    return jaxtyped(_check(function), typechecker=None)
 
 
 class CheckingLoader(SourceFileLoader):
