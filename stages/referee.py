@@ -89,10 +89,10 @@ def judge(run: RunName = "default", workers: Workers = CORES, runs_dir: RunsDir 
     chosen = judging.chosen_evenly(grasps.quality, objects, wanted.grasps, rng)  # scene by scene
     again = judging.chosen_evenly(grasps.quality[chosen], objects[chosen], wanted.varied, rng)
     among = np.isin(np.arange(len(chosen)), again)
+    weights = judging.stands_for(grasps.quality, chosen)
+    poses = grasps.world_from_gripper
     jobs = [
-        SceneJob(
-            int(scene), grasps.world_from_gripper[rows], grasps.body_id[rows], some, folder, config
-        )
+        SceneJob(int(scene), poses[rows], grasps.body_id[rows], some, folder, config)
         for scene in np.unique(grasps.scene[chosen])
         for here in [grasps.scene[chosen] == scene]
         for rows, some in [(chosen[here], among[here])]
@@ -108,7 +108,7 @@ def judge(run: RunName = "default", workers: Workers = CORES, runs_dir: RunsDir 
     scores |= predicted(RunFolder(runs_dir / run), grasps, chosen, config)
     of_them = {name: score[among] for name, score in scores.items()}
     figures = {
-        **figures_of(scores, found, objects[chosen], wanted, rng),
+        **figures_of(scores, found, objects[chosen], weights, wanted, rng),
         "varied": varied(of_them, found["borne_n"][among], among_n, wanted),
         "ms_a_grasp": 1e3 * float(found.pop("seconds").mean()),
         "wall_time_s": time.perf_counter() - began,

@@ -9,12 +9,44 @@ from scipy.stats import rankdata, spearmanr
 
 from pipeline.config.agreement import AgreementConfig
 
+FEWEST_OF_AN_OBJECT = 20  # a rank correlation of fewer grasps is mostly chance
+
 
 def spearman(score: Float[np.ndarray, " n"], borne_n: Float[np.ndarray, " n"]) -> float | None:
     """Rank correlation; None where either is constant or there are under three."""
     if len(score) < 3 or np.ptp(score) == 0 or np.ptp(borne_n) == 0:
         return None
     return float(spearmanr(score, borne_n).statistic)
+
+
+def weighted_spearman(
+    score: Float[np.ndarray, " n"],
+    borne_n: Float[np.ndarray, " n"],
+    weights: Float[np.ndarray, " n"],
+) -> float | None:
+    """`spearman` with each grasp counted as often as its weight says."""
+    if spearman(score, borne_n) is None:
+        return None
+    ranks = []
+    for values in (score, borne_n):
+        _, group = np.unique(values, return_inverse=True)
+        held = np.bincount(group, weights)
+        ranks.append((np.cumsum(held) - held / 2)[group])
+    covariance = np.cov(ranks, aweights=weights)
+    return float(covariance[0, 1] / np.sqrt(covariance[0, 0] * covariance[1, 1]))
+
+
+def spearman_within(
+    score: Float[np.ndarray, " n"], borne_n: Float[np.ndarray, " n"], objects: Int[np.ndarray, " n"]
+) -> float | None:
+    """Median over objects of `spearman` among the grasps of one; None without one of enough."""
+    found = []
+    for one in np.unique(objects):
+        own = objects == one
+        if own.sum() >= FEWEST_OF_AN_OBJECT:
+            found.append(spearman(score[own], borne_n[own]))
+    known = [value for value in found if value is not None]
+    return float(np.median(known)) if known else None
 
 
 def auroc(score: Float[np.ndarray, " n"], holds: Bool[np.ndarray, " n"]) -> float | None:
@@ -43,6 +75,7 @@ def agreement(
     score: Float[np.ndarray, " n"],
     borne_n: Float[np.ndarray, " n"],
     objects: Int[np.ndarray, " n"],
+    weights: Float[np.ndarray, " n"],
     loads_n: Sequence[float],
     resamples: int,
     rng: np.random.Generator,
@@ -57,6 +90,8 @@ def agreement(
         What the referee finds, shape (n,) [N].
     objects
         Index of each grasp's object, shape (n,).
+    weights
+        How many labelled grasps each stands for, shape (n,).
     loads_n
         Weights to be borne [N].
     resamples
@@ -66,10 +101,11 @@ def agreement(
 
     Returns
     -------
-    ``grasps``, ``spearman``, ``spearman_interval`` and ``auroc`` by load.
+    ``grasps``, ``spearman``, ``spearman_interval``, ``auroc`` by load; ``spearman_as_labelled``
+    with the weights, and ``spearman_within_objects``.
     """
     known = np.isfinite(score)
-    score, borne_n, objects = score[known], borne_n[known], objects[known]
+    score, borne_n, objects, weights = score[known], borne_n[known], objects[known], weights[known]
     found = []
     members = [np.flatnonzero(objects == one) for one in np.unique(objects)]
     for _ in range(resamples if members else 0):
@@ -81,6 +117,8 @@ def agreement(
         "grasps": len(score),
         "spearman": spearman(score, borne_n),
         "spearman_interval": np.quantile(found, [0.025, 0.975]).tolist() if found else None,
+        "spearman_as_labelled": weighted_spearman(score, borne_n, weights),
+        "spearman_within_objects": spearman_within(score, borne_n, objects),
         "auroc": {f"{load:g}": auroc(score, borne_n >= load) for load in loads_n},
     }
 
@@ -89,6 +127,7 @@ def figures_of(
     scores: Mapping[str, Float[np.ndarray, " n"]],
     found: Mapping[str, Float[np.ndarray, " n"]],
     objects: Int[np.ndarray, " n"],
+    weights: Float[np.ndarray, " n"],
     config: AgreementConfig,
     rng: np.random.Generator,
 ) -> dict[str, Any]:
@@ -102,6 +141,8 @@ def figures_of(
         ``borne_n`` and ``straight_n`` of `judging.Judged`, shape (n,) [N].
     objects
         Index of each grasp's object, shape (n,).
+    weights
+        How many labelled grasps each stands for, shape (n,).
     config
         Loads, and how many bootstrap samples.
     rng
@@ -115,7 +156,9 @@ def figures_of(
     borne_n = found["borne_n"]
     against = {
         load: {
-            name: agreement(score, found[load], objects, config.loads_n, config.resamples, rng)
+            name: agreement(
+                score, found[load], objects, weights, config.loads_n, config.resamples, rng
+            )
             for name, score in scores.items()
         }
         for load in ("borne_n", "straight_n")
@@ -155,13 +198,13 @@ def varied(
     By variation: ``median_borne_n``, and ``scores`` with the figures of each.
     """
     each = {"as configured": as_configured_n, **borne_n}
-    every = np.zeros(len(as_configured_n), dtype=np.int64)
+    every, even = np.zeros(len(as_configured_n), dtype=np.int64), np.ones(len(as_configured_n))
     none = np.random.default_rng(0)  # draws nothing: no interval is asked for
     return {
         name: {
             "median_borne_n": float(np.median(values)) if len(values) else None,
             "scores": {
-                score: agreement(predicted, values, every, config.loads_n, 0, none)
+                score: agreement(predicted, values, every, even, config.loads_n, 0, none)
                 for score, predicted in scores.items()
             },
         }

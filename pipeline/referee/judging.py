@@ -207,3 +207,24 @@ def chosen_evenly(
     turn = np.empty(len(quality), dtype=np.int64)
     turn[order] = np.arange(len(quality)) - np.repeat(first, counts)
     return np.sort(shuffled[np.argsort(turn, kind="stable")[:wanted]])
+
+
+def stands_for(
+    quality: Float[np.ndarray, " n"], chosen: Int[np.ndarray, " k"]
+) -> Float[np.ndarray, " k"]:
+    """How many grasps of its tenth of q each chosen one stands for.
+
+    Parameters
+    ----------
+    quality
+        q of all grasps, shape (n,).
+    chosen
+        Indices of some, shape (k,).
+
+    Returns
+    -------
+    At least 1, shape (k,).
+    """
+    tenth = np.clip((10 * quality).astype(np.int64), 0, 9)
+    every, some = (np.bincount(part, minlength=10) for part in (tenth, tenth[chosen]))
+    return np.asarray(every[tenth[chosen]] / some[tenth[chosen]])

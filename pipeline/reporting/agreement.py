@@ -28,6 +28,11 @@ def as_markdown(figures: Mapping[str, Any]) -> str:
         *_head("score", loads),
     ]
     lines += [_row(name, found, loads) for name, found in figures["scores"].items()]
+    lines += [
+        "",
+        "Grasps are chosen evenly over q and objects; «as labelled» counts each as often as its "
+        "tenth of q occurs, «within objects» is the median over objects.",
+    ]
     lines += ["", "Against the straight pull, no weight's lever:", "", *_head("score", loads)]
     lines += [_row(name, found, loads) for name, found in figures["straight_pull"].items()]
     lines += ["", "| q | grasps | borne [N]: quartiles |", "|-|-|-|"]
@@ -60,14 +65,19 @@ def _varied(varied: Mapping[str, Any], loads: list[str]) -> list[str]:
 
 def _head(first: str, loads: list[str]) -> tuple[str, str]:
     auroc = " | ".join(f"AUROC, bears {load} N" for load in loads)
-    return f"| {first} | grasps | Spearman | {auroc} |", "|-" * (3 + len(loads)) + "|"
+    spearman = "Spearman | as labelled | within objects"
+    return f"| {first} | grasps | {spearman} | {auroc} |", "|-" * (5 + len(loads)) + "|"
 
 
 def _row(name: str, found: Mapping[str, Any], loads: list[str]) -> str:
     interval = found["spearman_interval"]
     around = f" ({interval[0]:.2f} to {interval[1]:.2f})" if interval else ""
     auroc = " | ".join(_figure(found["auroc"][load]) for load in loads)
-    return f"| {name} | {found['grasps']} | {_figure(found['spearman'])}{around} | {auroc} |"
+    others = [_figure(found[f"spearman_{kind}"]) for kind in ("as_labelled", "within_objects")]
+    return (
+        f"| {name} | {found['grasps']} | {_figure(found['spearman'])}{around} "
+        f"| {' | '.join(others)} | {auroc} |"
+    )
 
 
 def _figure(value: float | None) -> str:

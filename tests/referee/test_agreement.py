@@ -11,7 +11,9 @@ from pipeline.referee.agreement import (
     figures_of,
     most_apart,
     spearman,
+    spearman_within,
     varied,
+    weighted_spearman,
 )
 
 
@@ -31,10 +33,35 @@ def test_spearman_is_of_ranks() -> None:
     assert spearman(np.zeros(10), x) is None
 
 
+def test_a_weight_counts_a_grasp_so_often() -> None:
+    rng = np.random.default_rng(2)
+    score, borne = rng.integers(0, 6, 40) / 6, rng.integers(0, 9, 40) * 0.5
+    often = rng.integers(1, 5, 40)
+    expected = spearman(np.repeat(score, often), np.repeat(borne, often))
+    assert weighted_spearman(score, borne, often.astype(float)) == pytest.approx(expected)
+    assert weighted_spearman(score, borne, np.ones(40)) == pytest.approx(spearman(score, borne))
+    assert weighted_spearman(np.ones(40), borne, np.ones(40)) is None
+
+
+def test_within_objects_a_difference_between_them_is_no_matter() -> None:
+    score = np.tile(np.arange(25.0), 2)
+    objects = np.repeat([0, 1], 25)
+    borne = score - 100.0 * objects
+    assert spearman_within(score, borne, objects) == pytest.approx(1.0)
+    assert spearman(score, borne) < 0.7
+    assert spearman_within(score[:10], borne[:10], objects[:10]) is None
+
+
 def test_grasps_without_a_score_are_left_out() -> None:
     score = np.array([0.1, np.nan, 0.9, 0.5])
     found = agreement(
-        score, np.arange(4.0), np.array([0, 0, 1, 1]), (1.5,), 50, np.random.default_rng(0)
+        score,
+        np.arange(4.0),
+        np.array([0, 0, 1, 1]),
+        np.ones(4),
+        (1.5,),
+        50,
+        np.random.default_rng(0),
     )
     assert found["grasps"] == 3
     assert found["auroc"] == {"1.5": 1.0}
@@ -61,7 +88,7 @@ def test_figures_have_the_names_that_others_rely_on() -> None:
     quality = rng.random(50)
     found = {"borne_n": 4 * quality, "straight_n": quality**2}
     config = AgreementConfig(resamples=10)
-    figures = figures_of({"q": quality}, found, np.arange(50) % 5, config, rng)
+    figures = figures_of({"q": quality}, found, np.arange(50) % 5, np.ones(50), config, rng)
     assert figures["grasps"] == 50
     assert figures["spearman"] == pytest.approx(1.0)
     assert figures["auroc"]["2"] == 1.0

@@ -5,7 +5,14 @@ import trimesh
 
 from pipeline.config.referee import RefereeConfig
 from pipeline.geometry.mesh import Mesh
-from pipeline.referee.judging import chosen_evenly, judged, placed, variations, weights_borne_n
+from pipeline.referee.judging import (
+    chosen_evenly,
+    judged,
+    placed,
+    stands_for,
+    variations,
+    weights_borne_n,
+)
 
 RADIUS_M = 0.025
 
@@ -20,6 +27,11 @@ def test_a_choice_is_even_over_tenths_and_objects() -> None:
     tenth = np.minimum((10 * quality[chosen]).astype(int), 9)
     assert np.bincount(tenth, minlength=10).max() < 30
     assert len(chosen_evenly(quality, objects, 5000, rng)) == 1100
+
+
+def test_chosen_grasps_stand_for_all_of_their_tenth() -> None:
+    quality = np.array([0.01, 0.02, 0.03, 0.04, 0.55, 0.58, 1.0])
+    np.testing.assert_array_equal(stands_for(quality, np.array([0, 3, 5, 6])), [2, 2, 2, 1])
 
 
 def test_each_figure_is_halved_and_doubled_where_it_may_be() -> None:
