@@ -151,5 +151,5 @@ fuzz: .venv/.ready  ## coverage-guided fuzzing of the readers, SECONDS_A_READER 
 	@for reader in mesh toml mcap checkpoint; do \
 	  $(PY) -m tests.fuzz $$reader --seconds $(SECONDS_A_READER) || exit 1; done
 
-clean:  ## remove what run RUN produced, keep its run.toml and families.toml
-	find $(R) -mindepth 1 ! -name run.toml ! -name families.toml -delete
+clean:  ## remove what run RUN produced, keep its run.toml, families.toml and masses.toml
+	find $(R) -mindepth 1 ! -name run.toml ! -name families.toml ! -name masses.toml -delete

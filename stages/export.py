@@ -91,11 +91,8 @@ def export_grasps(folder: RunFolder, into: Path, wanted: Format, least_quality: 
     if wanted is Format.ACRONYM:
         from pipeline.interchange.acronym import write_acronym  # h5py is an extra
 
-        config = load_run_config(folder.config)
-        density, friction = config.objects.density_kg_m3, config.gripper.friction
-        write = partial(
-            write_acronym, into, least_quality=least_quality, density=density, friction=friction
-        )
+        friction = load_run_config(folder.config).gripper.friction
+        write = partial(write_acronym, into, least_quality=least_quality, friction=friction)
     found = grasps_by_object(
         folder.artifact("objects"), folder.artifact("scenes"), folder.artifact("grasps")
     )

@@ -24,7 +24,7 @@ from pipeline.execution.staleness import (
     stage_context,
     why_stale,
 )
-from pipeline.geometry.mesh_folders import FAMILIES_FILE, list_mesh_files
+from pipeline.geometry.mesh_folders import FAMILIES_FILE, MASSES_FILE, list_mesh_files
 
 OBJECTS = Stage(
     "objects", ("seed", "objects", "split"), shown=("recording.objects",), drawn_apart=True
@@ -82,20 +82,27 @@ def inputs_of(stage: Stage, folder: RunFolder, mesh_dir: Path | None) -> dict[st
     if stage is OBJECTS and mesh_dir is not None:
         files = list_mesh_files(mesh_dir)
         inputs |= {f"meshes/{path.relative_to(mesh_dir).as_posix()}": path for path in files}
-    if stage is OBJECTS and (families := families_file(folder, mesh_dir)):
-        inputs[FAMILIES_FILE] = families
+    if stage is OBJECTS:
+        config = load_run_config(folder.config)
+        for file, named_by, named in (
+            (FAMILIES_FILE, "split.families", config.split.families),
+            (MASSES_FILE, "objects.masses", config.objects.masses),
+        ):
+            if path := told_of_objects(folder, mesh_dir, file, named_by, named):
+                inputs[file] = path
     return inputs
 
 
-def families_file(folder: RunFolder, mesh_dir: Path | None) -> Path | None:
-    """Where families are declared: the file that run.toml names, else the mesh folder's, if any."""
-    named = load_run_config(folder.config).split.families
+def told_of_objects(
+    folder: RunFolder, mesh_dir: Path | None, file: str, named_by: str, named: str
+) -> Path | None:
+    """What a person tells of the objects: the file that run.toml names, else the mesh folder's."""
     if named:
         path = folder.path / named
         if not path.is_file():
-            raise ConfigError(f"{path} is missing, and split.families names it", "Put it there")
+            raise ConfigError(f"{path} is missing, and {named_by} names it", "Put it there")
         return path
-    beside = mesh_dir / FAMILIES_FILE if mesh_dir else None
+    beside = mesh_dir / file if mesh_dir else None
     return beside if beside and beside.is_file() else None
 
 

@@ -26,7 +26,8 @@ from pipeline.geometry.catalogue import (
     measure_object,
 )
 from pipeline.geometry.families import DeclaredFamily, read_declared
-from pipeline.geometry.mesh_folders import FAMILIES_FILE
+from pipeline.geometry.masses import mass_of, read_masses
+from pipeline.geometry.mesh_folders import FAMILIES_FILE, MASSES_FILE
 from pipeline.geometry.object_names import readable_name
 from pipeline.geometry.parametric import PARAMETRIC_OBJECTS, parametric_source
 from pipeline.geometry.plan import Plan, plan_catalogue
@@ -138,17 +139,25 @@ def measured_or_why_not(
 def finish(stage: StageContext, plan: Plan) -> list[CatalogueObject]:
     """Bring every object that is taken to its size, and cut it into convex parts."""
     cache = stage.folder.cache / "convex_parts"
-    job = partial(finished, config=stage.config.objects, seed=stage.config.seed, cache=cache)
+    path = stage.inputs.get(MASSES_FILE)
+    masses = read_masses(path) if path else {}
+    config, seed = stage.config.objects, stage.config.seed
+    job = partial(finished, config=config, seed=seed, cache=cache, masses=masses)
     results = run_in_order(job, plan.taken, stage.workers, stage.executor)
     shown = progress(results, len(plan.taken), "objects: convex parts", "object")
     return [replace(item, family=plan.families.of[item.name]) for item in shown]
 
 
 def finished(
-    measured: MeasuredObject, config: ObjectsConfig, seed: int, cache: Path
+    measured: MeasuredObject,
+    config: ObjectsConfig,
+    seed: int,
+    cache: Path,
+    masses: Mapping[str, float],
 ) -> CatalogueObject:
-    """Rescale one object and cut it into convex parts."""
-    return finish_object(measured, config, generator(seed, "object", measured.content), cache)
+    """Rescale one object, weigh it and cut it into convex parts."""
+    rng = generator(seed, "object", measured.content)
+    return finish_object(measured, config, rng, cache, mass_of(measured.source.name, masses))
 
 
 def publish(

@@ -27,7 +27,10 @@ def catalogue_object(
     extent = float(mesh.extents_m.max())
     multiple = extent / ObjectsConfig().r_g_m
     config = ObjectsConfig(
-        target_extent_min_rg=multiple, target_extent_max_rg=multiple, density_kg_m3=density_kg_m3
+        target_extent_min_rg=multiple,
+        target_extent_max_rg=multiple,
+        density_kg_m3=density_kg_m3,
+        density_spread=1.0,
     )
     measured = MeasuredObject(source, mesh, (), value, shape_class(value), describe(mesh))
     return finish_object(measured, config, np.random.default_rng(0), cache)

@@ -12,8 +12,15 @@ def judged_config(config: RunConfig) -> RunConfig:
     """
     some = config.agreement.clutters_per_level
     counts = ClutterCounts(train=some, val=(some + 1) // 2, test=some)
-    families = config.split.families
-    alone = {"limit": 0, "embedded_in_training": False, "stretched_copies": 0}
+    families, masses = (
+        f"../{name}" if name else "" for name in (config.split.families, config.objects.masses)
+    )  # beside the run's own run.toml
+    alone = {
+        "limit": 0,
+        "embedded_in_training": False,
+        "stretched_copies": 0,
+        "masses": masses,
+    }
     scenes = {
         "clutters_per_level": counts,
         "levels": ScenesConfig().levels,
@@ -22,10 +29,7 @@ def judged_config(config: RunConfig) -> RunConfig:
     return config.model_copy(
         update={
             "objects": config.objects.model_copy(update=alone),
-            # The file lies beside the run's own run.toml.
-            "split": config.split.model_copy(
-                update={"families": f"../{families}" if families else ""}
-            ),
+            "split": config.split.model_copy(update={"families": families}),
             "scenes": config.scenes.model_copy(update=scenes),
             "grasps": config.grasps.model_copy(update={"count": config.agreement.labelled}),
         }

@@ -65,7 +65,18 @@ class ObjectsConfig(ScaledSection):
     min_thickness_m: float = Field(
         2e-4, ge=0, description="objects whose 2 V / A stays under this are refused [m]"
     )
-    density_kg_m3: float = Field(300.0, gt=0, description="mass from the closed mesh [kg/m3]")
+    density_kg_m3: float = Field(
+        300.0, gt=0, description="of the closed mesh, where an object's mass is not known [kg/m3]"
+    )
+    density_spread: float = Field(
+        2.0,
+        ge=1,
+        le=20,
+        description="each such object's density lies within this factor of that, drawn [1]",
+    )
+    masses: str = Field(
+        "", description="file beside run.toml of masses by object; else the mesh folder's"
+    )
     transparent: tuple[str, ...] = Field(
         (), description="names (with * and ?) of objects that depth cameras see through; VIII"
     )

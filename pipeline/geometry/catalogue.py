@@ -11,6 +11,7 @@ from pipeline.config.objects import ObjectsConfig
 from pipeline.errors import MeshError
 from pipeline.geometry.convex_parts import convex_parts
 from pipeline.geometry.descriptor import ShapeDescriptor, describe
+from pipeline.geometry.masses import density_of
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.mesh_files import MeshSource, UnitSource
 from pipeline.geometry.object_names import is_named
@@ -98,6 +99,11 @@ class CatalogueObject:
         """What the object is known by, whatever it is called."""
         return content_of(self.name, self.source_sha256)
 
+    @property
+    def density_kg_m3(self) -> float:
+        """Mean density of the closed mesh [kg/m3]."""
+        return self.mass_kg / self.volume_m3
+
 
 def content_of(name: str, sha256: str) -> str:
     """Digest of a mesh's file; an embedded object goes by its name.
@@ -129,15 +135,21 @@ def check_thickness(label: str, mesh: Mesh, config: ObjectsConfig) -> None:
 
 
 def finish_object(
-    measured: MeasuredObject, config: ObjectsConfig, rng: np.random.Generator, cache_dir: Path
+    measured: MeasuredObject,
+    config: ObjectsConfig,
+    rng: np.random.Generator,
+    cache_dir: Path,
+    mass_kg: float | None = None,
 ) -> CatalogueObject:
     """Rescaling, centring, mass properties and convex parts (S-1.01's object, at its size).
 
-    rng: draws the target extent alone. cache_dir: where convex parts are kept.
+    rng: draws the target extent, then the density. cache_dir: where convex parts are kept.
+    mass_kg: of the object at its own size, where it is known.
     """
     target = _target_extent_m(measured.mesh, config, rng)
+    density_kg_m3 = density_of(measured.mesh, mass_kg, config, rng)
     scaled, scale = rescale(measured.mesh, target)
-    centre = mass_properties(scaled, config.density_kg_m3).centre_of_mass_m
+    centre = mass_properties(scaled, density_kg_m3).centre_of_mass_m
     mesh = Mesh(scaled.vertices_m - centre, scaled.faces)
     source = measured.source
     return CatalogueObject(
@@ -150,7 +162,7 @@ def finish_object(
         scale=scale,
         stretch=np.ones(3),
         target_extent_m=target,
-        **solid_properties(mesh, config.density_kg_m3),
+        **solid_properties(mesh, density_kg_m3),
         mesh=mesh,
         convex_parts=convex_parts(mesh, config.convex, cache_dir),
         material=material_of(source.name, config),
@@ -163,7 +175,7 @@ def stretched_copy(
     """Another shape: the object stretched along its axes, at a size of its own.
 
     An affine map keeps centroids, and keeps convex parts convex and covering: neither is searched
-    for again. NSVR and class are the copy's own.
+    for again. The density is the object's. NSVR and class are the copy's own.
 
     rng: draws the factors, then the target extent.
     """
@@ -178,7 +190,7 @@ def stretched_copy(
         scale=item.scale * scale,
         stretch=item.stretch * stretch,
         target_extent_m=target,
-        **solid_properties(mesh, config.density_kg_m3),
+        **solid_properties(mesh, item.density_kg_m3),
         mesh=mesh,
         convex_parts=tuple(parts),
     )

@@ -17,7 +17,7 @@ GRIPPER_TYPE = "soft_vacuum"
 
 
 def write_acronym(
-    folder: Path, grasps: ObjectGrasps, least_quality: float, density: float, friction: float
+    folder: Path, grasps: ObjectGrasps, least_quality: float, friction: float
 ) -> Path:
     """Write ``meshes/<name>.obj`` and ``grasps/<name>_1.h5`` of one object.
 
@@ -29,8 +29,6 @@ def write_acronym(
         All grasps of the object.
     least_quality
         Least q of a grasp that counts as a success.
-    density
-        Of the object [kg/m3].
     friction
         Of the object [1].
 
@@ -49,7 +47,7 @@ def write_acronym(
         file["object/mass"] = item.mass_kg
         file["object/volume"] = item.volume_m3
         file["object/inertia"] = item.inertia_kg_m2
-        file["object/density"] = density
+        file["object/density"] = item.density_kg_m3
         file["object/friction"] = friction
         file["gripper/type"] = GRIPPER_TYPE
         file["gripper/configuration"] = np.zeros(0)  # a pad has no joints

@@ -47,7 +47,7 @@ def test_a_copy_is_what_the_source_stretched_would_be(mug: CatalogueObject, seed
     assert copy.nsvr != pytest.approx(mug.nsvr, rel=1e-3)
     assert copy.shape_class == shape_class(copy.nsvr)
     assert_allclose(copy.centre_of_mass_m, 0.0, atol=1e-9)
-    surface.density = CONFIG.density_kg_m3
+    surface.density = mug.density_kg_m3
     assert copy.mass_kg == pytest.approx(surface.mass)
     assert_allclose(copy.inertia_kg_m2, surface.moment_inertia, atol=1e-9)
 

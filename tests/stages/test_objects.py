@@ -137,6 +137,22 @@ def test_names_in_any_script_stay_through_files_recordings_and_added_meshes(
         assert second[name].mesh.vertices_m.tobytes() == item.mesh.vertices_m.tobytes()
 
 
+def test_objects_weigh_what_a_file_says_and_keep_their_density(
+    tmp_path: Path, mesh_dir: Path
+) -> None:
+    (mesh_dir / "masses.toml").write_text('"box_0" = 0.5\n"box_[12]" = 9.0\n')
+    stage = context(tmp_path, mesh_dir, "[objects]\n[objects.convex]\ninput_faces = 200\n")
+    objects.build(stage)
+    found = {name: item for name, (item, _) in read_objects(stage.output).items()}
+    assert found["box_0"].mass_kg == pytest.approx(0.5 * found["box_0"].scale ** 3)
+    assert found["box_1"].mass_kg == pytest.approx(9.0 * found["box_1"].scale ** 3)
+    drawn = [found[f"box_{number}"].density_kg_m3 for number in range(3, 7)]
+    assert len(set(drawn)) == len(drawn)
+    assert all(150 <= density <= 600 for density in drawn)
+    with pytest.raises(ConfigError, match=r"mine\.toml is missing, and objects\.masses names it"):
+        context(tmp_path / "other", mesh_dir, '[objects]\nmasses = "mine.toml"\n')
+
+
 def test_families_are_declared_in_a_file_that_run_toml_names(
     tmp_path: Path, mesh_dir: Path
 ) -> None:
