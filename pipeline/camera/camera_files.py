@@ -24,6 +24,7 @@ RIGID_TOLERANCE = 1e-3  # poses in files are often rounded to four digits
 # Where pixels of a lens with distortion differ by more than this from those of a pinhole, the
 # picture is not one of a pinhole. Less is under the size of a cell of a sub cloud.
 DISTORTED_PX = 1.0
+FISHEYE_MODELS = ("equidistant", "fisheye", "kannala_brandt4")
 _PIXEL_CENTRE = 0.5
 
 
@@ -228,23 +229,59 @@ def _check_distortion(
         width, height = size or (2 * k[0, 2], 2 * k[1, 2])
         corners = np.array([(0, 0), (width, 0), (0, height), (width, height)], dtype=np.float64)
         at = (corners - k[:2, 2]) / k[[0, 1], [0, 1]]
-        moved = float(np.abs(_radial(at, given.ravel()) * k[[0, 1], [0, 1]]).max())
-        if moved > DISTORTED_PX:
+        model = str(content.get("distortion_model", ""))
+        distort = _seen_by_fisheye if model in FISHEYE_MODELS else _seen_by_lens
+        moved = (distort(at, given.ravel()) - at) * k[[0, 1], [0, 1]]
+        farthest_px = float(np.linalg.norm(moved, axis=1).max())
+        if not farthest_px <= DISTORTED_PX:
             raise PictureError(
-                f"{source}: its lens has distortion that moves pixels by up to {moved:.0f} px, "
-                "and the pictures are taken as a pinhole's",
+                f"{source}: its lens has distortion that moves pixels by up to "
+                f"{farthest_px:.0f} px, and the pictures are taken as a pinhole's",
                 "Rectify colour and depth first, and give the rectified camera (in ROS: "
                 "image_proc, whose CameraInfo has D = 0)",
             )
 
 
-def _radial(
+def _seen_by_lens(
     at: Float[np.ndarray, "n 2"], coefficients: Float[np.ndarray, " c"]
 ) -> Float[np.ndarray, "n 2"]:
-    """How far Brown's radial terms k1, k2, k3 move points of the plane at depth 1."""
-    k1, k2, _, _, k3 = np.pad(coefficients, (0, max(0, 5 - len(coefficients))))[:5]
-    squared = (at**2).sum(axis=1, keepdims=True)
-    return np.asarray(at * (k1 * squared + k2 * squared**2 + k3 * squared**3))
+    """Where a lens shows points of the plane at depth 1: Brown's and the rational model.
+
+    Parameters
+    ----------
+    at
+        Points as a pinhole shows them, shape (n, 2).
+    coefficients
+        k1, k2, p1, p2, k3, k4, k5, k6 as OpenCV orders them; fewer are filled with 0.
+
+    Returns
+    -------
+    Points as the lens shows them, shape (n, 2).
+    """
+    filled = np.pad(coefficients, (0, max(0, 8 - len(coefficients))))[:8]
+    k1, k2, p1, p2, k3, k4, k5, k6 = filled
+    x, y = at.T
+    r2 = x**2 + y**2
+    radial = (1 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1 + r2 * (k4 + r2 * (k5 + r2 * k6)))
+    return np.stack(
+        [
+            x * radial + 2 * p1 * x * y + p2 * (r2 + 2 * x**2),
+            y * radial + p1 * (r2 + 2 * y**2) + 2 * p2 * x * y,
+        ],
+        axis=1,
+    )
+
+
+def _seen_by_fisheye(
+    at: Float[np.ndarray, "n 2"], coefficients: Float[np.ndarray, " c"]
+) -> Float[np.ndarray, "n 2"]:
+    """The same for the equidistant model of Kannala and Brandt, k1 to k4."""
+    k = np.pad(coefficients, (0, max(0, 4 - len(coefficients))))[:4]
+    radius = np.maximum(np.linalg.norm(at, axis=1, keepdims=True), 1e-12)
+    angle = np.arctan(radius)
+    squared = angle**2
+    shown = angle * (1 + squared * (k[0] + squared * (k[1] + squared * (k[2] + squared * k[3]))))
+    return np.asarray(at * shown / radius)
 
 
 def _numbers(value: Any, name: str, source: str) -> Float[np.ndarray, "..."]:

@@ -11,6 +11,10 @@ from pipeline.world.cameras import PinholeCamera, project_local
 
 SPLAT_PX_A_POINT = 1.3  # pixels a point of a cloud at the mean distance should cover
 LARGEST_PX = 1024  # no depth camera has more pixels a side
+SQUARE_PIXEL = 1.25  # focal lengths differ less: pictures are not stretched by more
+# A lens' centre lies within a tenth of the picture's middle; a crop moves it elsewhere, but not by
+# one and the same factor in both directions.
+_CENTRE_TOLERANCE, _OTHER_SCALE = 0.1, 1.4
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,6 +89,21 @@ def camera_of_picture(
             f"of {width} by {height} pixels",
             "Give the intrinsics of this picture's size: scale them with it",
         )
+    other = _size_meant(cx, cy, width, height)
+    if other is not None:
+        raise PictureError(
+            f"{name}: the intrinsics' centre ({cx:.0f}, {cy:.0f}) px is that of a picture of "
+            f"{other[0]} by {other[1]} pixels, and the depth image has {width} by {height}",
+            "Give the intrinsics of this picture's size: scale them with it",
+        )
+    if max(intrinsics[0, 0], intrinsics[1, 1]) > SQUARE_PIXEL * min(
+        intrinsics[0, 0], intrinsics[1, 1]
+    ):
+        raise PictureError(
+            f"{name}: the focal lengths {intrinsics[0, 0]:.0f} and {intrinsics[1, 1]:.0f} px "
+            "differ, and pixels of depth cameras are square",
+            "Give the intrinsics of this picture: where it was stretched, they stretch with it",
+        )
     angle_rad = 2 * np.arctan(width / 2 / intrinsics[0, 0])
     if not np.radians(10) < angle_rad < np.radians(150):
         raise PictureError(
@@ -102,6 +121,20 @@ def camera_of_picture(
         near_m=0.0,
         far_m=np.inf,
     )
+
+
+def _size_meant(cx: float, cy: float, width: int, height: int) -> tuple[int, int] | None:
+    """Width and height of the picture that a centre is the middle of, where that is another."""
+    wide, high = 2 * cx, 2 * cy
+    scale = wide / width
+    alike = abs(scale * height / high - 1) < _CENTRE_TOLERANCE
+    scaled = alike and not 1 / _OTHER_SCALE < scale < _OTHER_SCALE
+    turned = (
+        abs(wide / height - 1) < _CENTRE_TOLERANCE
+        and abs(high / width - 1) < _CENTRE_TOLERANCE
+        and abs(width / height - 1) > 2 * _CENTRE_TOLERANCE
+    )
+    return (round(wide), round(high)) if scaled or turned else None
 
 
 def frame_of_cloud(

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
@@ -91,6 +92,30 @@ def test_what_is_no_camera_is_refused(content: Any, says: str) -> None:
     with pytest.raises(PictureError, match=says) as told:
         camera_of(content, "camera.json")
     assert "camera.json" in str(told.value)
+
+
+@pytest.mark.parametrize(
+    ("model", "coefficients"),
+    [
+        ("plumb_bob", [-0.2, 0.1, 0.003, -0.002, 0.01]),
+        ("rational_polynomial", [0.6, -2.3, 1e-3, -4e-4, 1.4, 0.5, -2.1, 1.3]),
+        ("equidistant", [-0.02, 0.01, 0.0, 0.001]),
+    ],
+)
+def test_how_far_a_lens_moves_pixels_is_as_opencv_has_it(
+    model: str, coefficients: list[float]
+) -> None:
+    corners = np.array([(0, 0), (640, 0), (0, 480), (640, 480)], dtype=np.float64)
+    at = np.column_stack([(corners - EXPECTED[:2, 2] + 0.5) / (615.0, 616.0), np.ones(4)])
+    nowhere, given = np.zeros(3), np.array(coefficients)
+    if model == "equidistant":
+        shown, _ = cv2.fisheye.projectPoints(at[:, None], nowhere, nowhere, np.array(K), given)
+    else:
+        shown, _ = cv2.projectPoints(at, nowhere, nowhere, np.array(K), given)
+    moved = float(np.linalg.norm(shown.reshape(-1, 2) - corners, axis=1).max())
+    content = {"k": FLAT, "d": coefficients, "width": 640, "height": 480}
+    with pytest.raises(PictureError, match=f"moves pixels by up to {moved:.0f} px"):
+        camera_of({**content, "distortion_model": model}, "f")
 
 
 def test_a_slight_distortion_is_no_matter() -> None:

@@ -47,6 +47,9 @@ def test_a_missing_camera_is_asked_for(depth: Path) -> None:
     [
         ({"width": 640, "height": 480}, "640 by 480 pixels, and .* has 320 by 240"),
         ({"K": [300, 0, 900, 0, 300, 120, 0, 0, 1]}, "centre .* lies outside the depth image"),
+        ({"K": [150, 0, 79.5, 0, 150, 59.5, 0, 0, 1]}, "of a picture of 160 by 120 pixels, and"),
+        ({"K": [300, 0, 119.5, 0, 300, 159.5, 0, 0, 1]}, "of a picture of 240 by 320 pixels, and"),
+        ({"K": [300, 0, 159.5, 0, 400, 119.5, 0, 0, 1]}, "pixels of depth cameras are square"),
         ({"K": [9000, 0, 160, 0, 9000, 120, 0, 0, 1]}, "a picture 2 degrees wide"),
     ],
 )
@@ -59,6 +62,43 @@ def test_intrinsics_that_do_not_fit_are_refused(
     depth.with_name("desk.json").write_text(json.dumps(given))
     with pytest.raises(PictureError, match=says):
         read_frame(FrameFiles(depth))
+
+
+def test_a_crop_off_the_middle_is_taken(depth: Path) -> None:
+    k = [[300.0, 0.0, 90.0], [0.0, 300.0, 150.0], [0.0, 0.0, 1.0]]
+    depth.with_name("desk.json").write_text(json.dumps({"intrinsics": k}))
+    assert read_frame(FrameFiles(depth)).camera.intrinsics[0, 2] == 90.5
+
+
+def test_a_picture_of_another_size_than_its_depth_is_refused(depth: Path) -> None:
+    Image.new("RGB", (640, 480)).save(depth.with_name("desk.color.png"))
+    with pytest.raises(PictureError, match="colour picture is 640 by 480 pixels, and the depth"):
+        read_frame(FrameFiles(depth))
+
+
+def test_a_camera_with_distortion_is_refused(depth: Path) -> None:
+    text = (
+        "image_width: 320\nimage_height: 240\n"
+        "camera_matrix: {rows: 3, cols: 3, data: [300, 0, 159.5, 0, 300, 119.5, 0, 0, 1]}\n"
+        "distortion_model: plumb_bob\n"
+        "distortion_coefficients: {rows: 1, cols: 5, data: [-0.2, 0.05, 0, 0, 0]}\n"
+    )
+    camera = depth.with_name("lens.yaml")
+    camera.write_text(text)
+    with pytest.raises(PictureError, match=r"lens\.yaml: its lens has distortion .* Rectify"):
+        read_frame(FrameFiles(depth, camera=camera))
+
+
+def test_nan_is_what_was_not_measured(tmp_path: Path) -> None:
+    path = tmp_path / "desk.depth.npy"
+    depth_m = np.full((HEIGHT_PX, WIDTH_PX), 0.7, dtype=np.float32)
+    depth_m[:50] = np.nan
+    depth_m[50:60] = np.inf
+    np.save(path, depth_m)
+    (tmp_path / "desk.json").write_text(json.dumps({"intrinsics": INTRINSICS.tolist()}))
+    read = read_frame(FrameFiles(path)).depth_m
+    assert (read[:60] == 0).all()
+    assert (read[60:] == np.float32(0.7)).all()
 
 
 def test_a_mask_of_what_was_not_measured_is_refused(depth: Path) -> None:
