@@ -29,7 +29,7 @@ ifeq (,$(strip $(WORKERS)))
 unexport WORKERS
 endif
 
-.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee review report export predict docs lint fuzz regress clean FORCE
+.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee review report export predict real docs lint fuzz regress clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -128,6 +128,10 @@ PREDICT_OPTIONS = $(foreach option,camera colour mask instances workspace depth-
 predict: .venv/.ready  ## grasps on a real picture: DEPTH=file [camera=file mask=file tilt_deg=90 ...]
 	@test -n "$(DEPTH)" || { echo "Give the picture: make predict DEPTH=file.depth.png"; exit 1; }
 	@$(PY) -m stages.predict $(DEPTH) $(PREDICT_OPTIONS)
+
+real: .venv/.ready  ## network and baseline on real frames: FRAMES=folder [tilt_deg=90 ...], to runs/<run>/real
+	@test -n "$(FRAMES)" || { echo "Give the frames: make real FRAMES=folder"; exit 1; }
+	@$(PY) -m stages.real $(FRAMES) $(foreach option,tilt-deg radius-mm out,$(if $($(subst -,_,$(option))),--$(option) "$($(subst -,_,$(option)))"))
 
 docs: .venv/.ready  ## the pages and a reference of every module as a site, to runs/docs
 	@$(PY) -m stages.docs

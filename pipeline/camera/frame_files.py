@@ -1,8 +1,8 @@
 """Frames from files: a depth image or a point cloud, and what lies beside it.
 
 Files that are not named are looked for beside the depth image by the names of datasets:
-``NAME.depth.png`` goes with ``NAME.json`` (or ``.yaml``), ``NAME.color.*`` (or ``.colour.*``),
-``NAME.mask.png`` and ``NAME.instances.png``.
+``NAME.depth.png`` goes with ``NAME.json`` (or ``.yaml``; else the folder's ``camera.json``),
+``NAME.color.*`` (or ``.colour.*``), ``NAME.mask.png`` and ``NAME.instances.png``.
 """
 
 import json
@@ -24,6 +24,8 @@ from pipeline.world.cameras import points_of_depth
 
 CLOUD_SUFFIXES = (".ply", ".pcd")
 CAMERA_SUFFIXES = (".json", ".yaml", ".yml")
+SHARED_CAMERAS = ("camera", "intrinsics")  # of all frames of a folder
+DEPTH_SUFFIXES = (".png", ".tif", ".tiff", ".npy", ".exr")
 COLOUR_WORDS = (".color", ".colour", ".rgb")
 PICTURE_SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff")
 
@@ -111,15 +113,52 @@ def read_frame(files: FrameFiles) -> Frame:
 def with_neighbours(files: FrameFiles) -> FrameFiles:
     """The same with what lies beside the depth image, where nothing else was named."""
     folder, name = files.depth.parent, frame_name(files.depth)
+    cameras = [
+        folder / f"{stem}{end}" for stem in (name, *SHARED_CAMERAS) for end in CAMERA_SUFFIXES
+    ]
     return replace(
         files,
-        camera=files.camera or _first(folder / f"{name}{suffix}" for suffix in CAMERA_SUFFIXES),
+        camera=files.camera or _first(cameras),
         colour=files.colour
         or _first(
             folder / f"{name}{word}{suffix}" for word in COLOUR_WORDS for suffix in PICTURE_SUFFIXES
         ),
-        mask=files.mask or _first([folder / f"{name}.mask.png"]),
+        mask=files.mask or _first(folder / f"{name}.mask{end}" for end in PICTURE_SUFFIXES),
         instances=files.instances or _first([folder / f"{name}.instances.png"]),
+    )
+
+
+def frames_in(folder: Path) -> list[FrameFiles]:
+    """All frames of a folder and of the folders in it, in the order of their paths.
+
+    Parameters
+    ----------
+    folder
+        Holds ``NAME.depth.*`` or point clouds (`CLOUD_SUFFIXES`), with what lies beside them.
+
+    Returns
+    -------
+    The files of each frame, those beside it not yet looked for.
+
+    Raises
+    ------
+    PictureError
+        There is no such folder, or no frame in it.
+    """
+    found = [path for path in sorted(folder.rglob("*")) if path.is_file() and _is_frame(path)]
+    if not found:
+        raise PictureError(
+            f"{folder} holds no frame" if folder.is_dir() else f"{folder} is no folder",
+            "Name depth images NAME.depth.png (.tif, .npy, .exr), each with NAME.json beside it, "
+            "or give point clouds (.ply, .pcd)",
+        )
+    return [FrameFiles(path) for path in found]
+
+
+def _is_frame(path: Path) -> bool:
+    suffix = path.suffix.lower()
+    return suffix in CLOUD_SUFFIXES or (
+        suffix in DEPTH_SUFFIXES and path.stem.lower().endswith(".depth")
     )
 
 

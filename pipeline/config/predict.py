@@ -65,6 +65,33 @@ class SupportConfig(Section):
     )
 
 
+class TrialConfig(Section):
+    """How `make real` looks at first choices on real frames."""
+
+    tilt_max_rad: float = Field(
+        math.radians(100),
+        gt=0,
+        le=math.pi,
+        description="approach off the vertical: frames of single objects are seen from the side "
+        "[rad]",
+    )
+    repeats: int = Field(3, ge=1, le=100, description="draws of new contacts, and of lost pixels")
+    lost_share: float = Field(0.2, ge=0, lt=1, description="of the pixels, how many are lost [1]")
+    edge_clear_share: float = Field(
+        0.5, gt=0, le=2, description="an edge is near within so much of the pad's radius [1]"
+    )
+    edge_jump_m: float = Field(
+        0.01, gt=0, description="the surface is where it lies this near to the pad's plane [m]"
+    )
+    edge_share_max: float = Field(
+        0.1,
+        ge=0,
+        lt=1,
+        description="of the near pixels, how many may be empty, beside the mask or off the plane "
+        "[1]",
+    )
+
+
 class PredictConfig(Section):
     """From a real picture to ranked grasps."""
 
@@ -93,6 +120,7 @@ class PredictConfig(Section):
         0.3, ge=0, le=1, description="under this q-hat no grasp is called good [1]"
     )
     support: SupportConfig = SupportConfig()
+    trial: TrialConfig = TrialConfig()
 
     @model_validator(mode="after")
     def _top_are_among_the_candidates(self) -> Self:

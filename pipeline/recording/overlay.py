@@ -28,12 +28,8 @@ def grasp_picture(prediction: Prediction) -> Image.Image:
     """
     frame = prediction.frames[0]
     scale = max(1.0, WIDTH_PX / frame.camera.width_px)
-    size = (round(frame.camera.width_px * scale), round(frame.camera.height_px * scale))
-    picture = Image.fromarray(_background(frame)).resize(size, Image.Resampling.BILINEAR)
-    draw = ImageDraw.Draw(picture)
-    quality = prediction.proposals.quality
-    for index in range(len(quality) - 1, -1, -1):
-        _draw_pad(draw, prediction, index, scale)
+    picture = picture_with_pads(prediction, scale)
+    size = picture.size
     sheet = Image.new(
         "RGB", (size[0] + 2 * _MARGIN_PX + _SCALE_PX, size[1] + _TITLE_PX + _MARGIN_PX), _PAPER
     )
@@ -45,6 +41,21 @@ def grasp_picture(prediction: Prediction) -> Image.Image:
     ink.text((_MARGIN_PX, 36), radius, font=small, fill=_INK)
     _draw_scale(ink, size[0] + 2 * _MARGIN_PX, _TITLE_PX, size[1], prediction.quality_min)
     return sheet
+
+
+def picture_with_pads(prediction: Prediction, scale: float) -> Image.Image:
+    """The first frame's picture, enlarged by a scale, with every pad drawn on it."""
+    picture = picture_of(prediction.frames[0], scale)
+    draw = ImageDraw.Draw(picture)
+    for index in range(len(prediction.proposals) - 1, -1, -1):
+        _draw_pad(draw, prediction, index, scale)
+    return picture
+
+
+def picture_of(frame: Frame, scale: float) -> Image.Image:
+    """A frame's colour, or its depth where it has none, enlarged by a scale."""
+    size = (round(frame.camera.width_px * scale), round(frame.camera.height_px * scale))
+    return Image.fromarray(_background(frame)).resize(size, Image.Resampling.BILINEAR)
 
 
 def png_bytes(picture: Image.Image) -> bytes:

@@ -1,7 +1,11 @@
 """Depth images of scenes whose truth is known: a table or a bin with boxes, seen by rays."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 import trimesh
+from PIL import Image
 
 from pipeline.camera.frame import Frame, camera_of_picture
 from pipeline.geometry.mesh import Mesh
@@ -59,3 +63,18 @@ def seen(
     if not posed:
         camera = camera_of_picture("synthetic", (HEIGHT_PX, WIDTH_PX), INTRINSICS, np.eye(4))
     return Frame("synthetic", depth, camera, posed, np.ones(depth.shape, dtype=bool))
+
+
+def written(frame: Frame, folder: Path, name: str, mask: np.ndarray | None = None) -> Path:
+    """A frame as files: a 16-bit PNG in millimetres, its camera beside it, and a mask."""
+    path = folder / f"{name}.depth.png"
+    Image.fromarray(np.round(1e3 * frame.depth_m).astype(np.uint16)).save(path)
+    k = frame.camera.intrinsics.copy()
+    k[:2, 2] -= 0.5
+    camera = {"intrinsics": k.tolist()}
+    if frame.posed:
+        camera["world_from_camera"] = frame.camera.world_from_camera.tolist()
+    (folder / f"{name}.json").write_text(json.dumps(camera))
+    if mask is not None:
+        Image.fromarray(mask).save(folder / f"{name}.mask.png")
+    return path

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from pipeline.camera.frame import Frame
-from pipeline.camera.frame_files import FrameFiles, read_frame, within_workspace
+from pipeline.camera.frame_files import FrameFiles, frames_in, read_frame, within_workspace
 from pipeline.errors import PictureError
 from pipeline.world.cameras import points_of_depth
 from tests.camera.scenes import HEIGHT_PX, INTRINSICS, WIDTH_PX, seen, table
@@ -34,6 +34,20 @@ def test_what_lies_beside_a_depth_image_is_found(depth: Path) -> None:
     assert frame.colour[0, 0].tolist() == [9, 8, 7]
     assert frame.allowed.sum() == 100 * HEIGHT_PX
     assert frame.instances is None
+
+
+def test_one_camera_serves_all_frames_of_a_folder(depth: Path) -> None:
+    depth.with_name("desk.json").rename(depth.with_name("camera.json"))
+    assert read_frame(FrameFiles(depth)).camera.intrinsics[0, 0] == INTRINSICS[0, 0]
+
+
+def test_frames_of_a_folder_are_found_by_their_names(depth: Path) -> None:
+    folder = depth.parent
+    (folder / "below").mkdir()
+    for name in ("below/b.depth.npy", "c.PLY", "desk.mask.png", "d.npy", "camera.json"):
+        (folder / name).touch()
+    found = [item.depth.relative_to(folder).as_posix() for item in frames_in(folder)]
+    assert found == ["below/b.depth.npy", "c.PLY", "desk.depth.png"]
 
 
 def test_a_missing_camera_is_asked_for(depth: Path) -> None:

@@ -26,6 +26,10 @@ REDUCED = {
         "make -n regress AFRESH=embree",
         "CI runs it",
     ),
+    "make real FRAMES=runs/pictures": (
+        "make -n real FRAMES=runs/pictures",
+        "tests/stages/test_real.py runs it on smaller frames",
+    ),
     "make review RUN=ci STAGE=grasps": (
         "make -n review RUN=ci STAGE=grasps",
         "it ends when its viewer is closed; tests/stages/test_review.py opens it",

@@ -17,7 +17,7 @@ from pipeline.geometry.transforms import pose_from
 from pipeline.network.export import export_onnx_bytes
 from pipeline.network.ga_cnn import build_network
 from schemas.softgrip.v1.predictions_pb2 import RankedGrasps
-from tests.camera.scenes import INTRINSICS, box, seen, table
+from tests.camera.scenes import box, seen, table, written
 from tests.network.test_inference import lively
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -41,16 +41,7 @@ def frame(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("frames")
     target = box((0.12, 0.10, 0.08), (0.03, 0.02, 0.04))
     picture = seen([table(), target], (0.05, -0.35, 0.6), 0.001, posed=True)
-    path = folder / "desk.depth.png"
-    Image.fromarray(np.round(1e3 * picture.depth_m).astype(np.uint16)).save(path)
-    k = INTRINSICS.copy()
-    k[:2, 2] -= 0.5
-    camera = {
-        "intrinsics": k.tolist(),
-        "world_from_camera": picture.camera.world_from_camera.tolist(),
-    }
-    (folder / "desk.json").write_text(json.dumps(camera))
-    return path
+    return written(picture, folder, "desk")
 
 
 @pytest.fixture(scope="module")
