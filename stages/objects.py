@@ -145,7 +145,8 @@ def finish(stage: StageContext, plan: Plan) -> list[CatalogueObject]:
     job = partial(finished, config=config, seed=seed, cache=cache, masses=masses)
     results = run_in_order(job, plan.taken, stage.workers, stage.executor)
     shown = progress(results, len(plan.taken), "objects: convex parts", "object")
-    return [replace(item, family=plan.families.of[item.name]) for item in shown]
+    of, copies = plan.families.of, plan.copies
+    return [replace(item, family=of[item.name], copies=copies.get(item.name, ())) for item in shown]
 
 
 def finished(
@@ -184,6 +185,7 @@ def summary(
         "by_split": dict(sorted(Counter(split.values()).items())),
         "families": len({item.family for item in objects}),
         "transparent": sorted(item.name for item in objects if item.material == "transparent"),
+        "copies": {item.name: list(item.copies) for item in objects if item.copies},
         "repaired": sum(bool(item.repairs) for item in objects),
         "nsvr": {item.name: round(item.nsvr, 6) for item in objects},
         "left_out": [{"source": r.source, "reason": r.reason, "remedy": r.remedy} for r in refused],

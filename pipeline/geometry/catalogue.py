@@ -13,7 +13,7 @@ from pipeline.geometry.convex_parts import convex_parts
 from pipeline.geometry.descriptor import ShapeDescriptor, describe
 from pipeline.geometry.masses import density_of
 from pipeline.geometry.mesh import Mesh
-from pipeline.geometry.mesh_files import MeshSource, UnitSource
+from pipeline.geometry.mesh_files import MeshSource
 from pipeline.geometry.object_names import is_named
 from pipeline.geometry.repair import repair
 from pipeline.geometry.rescaling import draw_stretch, draw_target_extent, rescale
@@ -25,6 +25,7 @@ from pipeline.geometry.shape import (
     shape_class,
     solid_properties,
 )
+from pipeline.geometry.units import UnitSource
 
 Material = Literal["opaque", "transparent"]
 EMBEDDED = "parametric"
@@ -193,6 +194,7 @@ def stretched_copy(
         **solid_properties(mesh, item.density_kg_m3),
         mesh=mesh,
         convex_parts=tuple(parts),
+        copies=(),
     )
 
 

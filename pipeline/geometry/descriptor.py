@@ -7,7 +7,7 @@ middle of the solid and from each other, as sorted quantiles.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from scipy.spatial.distance import pdist
 
 from pipeline.geometry.mesh import Mesh
@@ -26,6 +26,8 @@ _CHORD_POINTS = 1024
 class ShapeDescriptor:
     """A closed surface's shape, free of scale, place, turn and mirroring, in units of cbrt(V)."""
 
+    length: float
+    """cbrt(V) in the mesh's unit; no part of the shape."""
     radii: Float[np.ndarray, " q"]
     """Sorted quantiles of the distances of surface points from the centre of mass [1]."""
     chords: Float[np.ndarray, " q"]
@@ -50,13 +52,14 @@ def describe(mesh: Mesh) -> ShapeDescriptor:
     """
     outer = outer_surface(mesh)
     enclosed = volume(outer)
-    length = np.cbrt(enclosed)
+    length = float(np.cbrt(enclosed))
     mass = mass_properties(outer, 1.0)
     points = (surface_points(outer, _POINTS) - mass.centre_of_mass_m) / length
     # Second moments along the axes from moments of inertia about them.
     inertia = np.sort(np.linalg.eigvalsh(mass.inertia_kg_m2)) / (enclosed * length**2)
     second = np.sort(inertia.sum() / 2 - inertia)
     return ShapeDescriptor(
+        length=length,
         radii=_quantiles(np.linalg.norm(points, axis=1)),
         chords=_quantiles(pdist(surface_points(outer, _CHORD_POINTS)) / length),
         moments=np.sqrt(np.maximum(second, 0.0)),
@@ -81,6 +84,13 @@ def shape_distance(one: ShapeDescriptor, other: ShapeDescriptor) -> float:
 
 def surface_points(mesh: Mesh, count: int) -> Float[np.ndarray, "count 3"]:
     """Points spread evenly over a surface, each for an equal share of its area; no draw in it."""
+    return points_and_faces(mesh, count)[0]
+
+
+def points_and_faces(
+    mesh: Mesh, count: int
+) -> tuple[Float[np.ndarray, "count 3"], Int[np.ndarray, " count"]]:
+    """`surface_points`, and the face that each lies on."""
     a, b, c = (mesh.vertices_m[mesh.faces[:, k]] for k in range(3))
     areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     reached = np.cumsum(areas)
@@ -90,9 +100,8 @@ def surface_points(mesh: Mesh, count: int) -> Float[np.ndarray, "count 3"]:
     u, v = (index / _PLASTIC) % 1.0, (index / _PLASTIC**2) % 1.0
     root = np.sqrt(u)
     weights = np.stack([1.0 - root, root * (1.0 - v), root * v], axis=1)
-    return np.asarray(
-        weights[:, :1] * a[face] + weights[:, 1:2] * b[face] + weights[:, 2:] * c[face]
-    )
+    points = weights[:, :1] * a[face] + weights[:, 1:2] * b[face] + weights[:, 2:] * c[face]
+    return points, face
 
 
 def _quantiles(distances: Float[np.ndarray, " n"]) -> Float[np.ndarray, " q"]:

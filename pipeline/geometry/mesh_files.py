@@ -4,7 +4,6 @@ import hashlib
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Literal
 from urllib.parse import unquote
 
 from pipeline.config.objects import ObjectsConfig
@@ -13,12 +12,8 @@ from pipeline.geometry.file_kinds import check_kind
 from pipeline.geometry.formats import gltf, obj, off, ply, stl
 from pipeline.geometry.formats.surface import Surface, check_faces_allowed
 from pipeline.geometry.mesh import Mesh
+from pipeline.geometry.units import METRES_PER_UNIT, UnitSource, length_unit
 
-UnitSource = Literal["declared", "configured", "detected"]
-
-_METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
-# Millimetres before centimetres: most tools for design write them.
-_DETECTION_ORDER = ("m", "mm", "cm")
 # Formats whose reader needs the file's bytes alone; glTF may name further files.
 _READERS = {".obj": obj.read, ".off": off.read, ".ply": ply.read, ".stl": stl.read}
 _GLTF_SUFFIXES = (".glb", ".gltf")
@@ -71,7 +66,7 @@ def load_mesh_file(path: Path, folder: Path, name: str, config: ObjectsConfig) -
     surface, digest = read_surface(path, folder, config)
     raw = surface.mesh
     unit, known_by = length_unit(label, float(raw.extents_m.max()), surface.unit, config)
-    mesh = Mesh(raw.vertices_m * _METRES_PER_UNIT[unit], raw.faces)
+    mesh = Mesh(raw.vertices_m * METRES_PER_UNIT[unit], raw.faces)
     return MeshSource(name, label, digest, mesh, unit, known_by, surface.notes)
 
 
@@ -134,30 +129,3 @@ def _beside(label: str, path: Path, folder: Path, config: ObjectsConfig, name: s
             f"{label} keeps its data in '{name[:80]}', which is not there", "Put it there"
         )
     return _bytes_of(f"{label}: '{name[:80]}'", found, folder, config)
-
-
-def length_unit(
-    label: str, extent: float, declared: str | None, config: ObjectsConfig
-) -> tuple[str, UnitSource]:
-    """The file's length unit and how it is known.
-
-    What the file declares holds; else what the configuration says; else the first of m, mm, cm
-    that puts the longest extent between the configured bounds. Raises MeshError where the size
-    lies outside them.
-    """
-    candidates: tuple[str, ...]
-    known_by: UnitSource
-    if declared is not None:
-        candidates, known_by = (declared,), "declared"
-    elif config.unit != "auto":
-        candidates, known_by = (config.unit,), "configured"
-    else:
-        candidates, known_by = _DETECTION_ORDER, "detected"
-    for unit in candidates:
-        if config.min_extent_m <= extent * _METRES_PER_UNIT[unit] <= config.max_extent_m:
-            return unit, known_by
-    raise MeshError(
-        f"{label} has an absurd size: its longest extent of {extent:.3g} is outside "
-        f"{config.min_extent_m:g} to {config.max_extent_m:g} m in {' or '.join(candidates)}",
-        "Declare its unit in objects.unit, or rescale the mesh",
-    )

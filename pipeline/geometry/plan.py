@@ -1,13 +1,14 @@
 """The plan of a catalogue: which of the measured objects a run takes, and into which split."""
 
 import difflib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 
 from pipeline.config.objects import ObjectsConfig, SplitConfig
 from pipeline.errors import ConfigError, MeshError
 from pipeline.geometry.catalogue import MeasuredObject
+from pipeline.geometry.copies import find_copies
 from pipeline.geometry.families import DeclaredFamily, Families
 from pipeline.geometry.object_names import distinct_names, is_named
 from pipeline.geometry.selection import Split, choose_subset
@@ -20,7 +21,9 @@ class Plan:
     """What becomes of each measured object."""
 
     measured: dict[str, MeasuredObject]
-    """All that could be measured, by name, in the order they were given."""
+    """All objects that could be measured, by name, in the order they were given."""
+    copies: dict[str, tuple[str, ...]]
+    """Further files of one surface, left out, by the object's name."""
     split: dict[str, Split]
     """Split of each object that is taken."""
     families: Families
@@ -83,25 +86,51 @@ def plan_catalogue(
     """
     config, splitting = configs
     meshes = {item.source.label: item for item in items if not item.embedded}
-    names = distinct_names(meshes, settled.names)
-    measured = {names[label]: item.called(names[label]) for label, item in meshes.items()}
+    copies = find_copies(list(meshes.values()), settled.names, config.copies_rms)
+    left_off = {label for of in copies.values() for label in of} if config.copies == "one" else {}
+    names = distinct_names([label for label in meshes if label not in left_off], settled.names)
+    measured = {names[at]: item.called(names[at]) for at, item in meshes.items() if at in names}
     measured |= {item.source.name: item for item in items if item.embedded}
     classes = {name: item.shape_class for name, item in measured.items() if name not in added}
     if not classes:
         raise MeshError("Not one mesh could be used", "See the reasons above, or unset MESH_DIR")
     check_transparent(config, sorted(measured))
     taken = {*choose_subset(classes, config.limit, seed), *added}
+    surfaces = [(label, *of) for label, of in copies.items()]
+    contents = [[meshes[label].content for label in surface] for surface in surfaces]
+    # A surface is split as that of its files was that came first.
+    settled = settled.with_splits(_shared_splits(contents, settled.splits))
     split, families = split_objects(
         [item for name, item in measured.items() if name in taken],
         added & measured.keys(),
-        declared,
+        [*declared, *_families_of_copies(surfaces, names)],
         splitting,
         seed,
         settled,
     )
     now = settled.with_splits({measured[name].content: where for name, where in split.items()})
-    now = now.with_names(names)
-    return Plan(measured, split, families, now)
+    now = now.with_splits(_shared_splits(contents, now.splits)).with_names(names)
+    listed = {names[label]: of for label, of in copies.items() if left_off}
+    return Plan(measured, listed, split, families, now)
+
+
+def _shared_splits(
+    surfaces: Sequence[Sequence[str]], splits: Mapping[str, Split]
+) -> dict[str, Split]:
+    """The split of every file of a surface where one of its files has one, by content."""
+    found: dict[str, Split] = {}
+    for contents in surfaces:
+        known = [splits[content] for content in contents if content in splits]
+        found |= dict.fromkeys(contents, known[0]) if known else {}
+    return found
+
+
+def _families_of_copies(
+    surfaces: Sequence[Sequence[str]], names: Mapping[str, str]
+) -> list[DeclaredFamily]:
+    """Where copies are objects of their own, one surface's are a family."""
+    groups = [sorted(names[at] for at in labels if at in names) for labels in surfaces]
+    return [DeclaredFamily(group[0], tuple(group)) for group in groups if len(group) > 1]
 
 
 def check_transparent(config: ObjectsConfig, names: list[str]) -> None:

@@ -19,8 +19,9 @@ from pipeline.config.objects import ObjectsConfig
 from pipeline.errors import MeshError
 from pipeline.geometry.formats.surface import check_faces_allowed, check_finite
 from pipeline.geometry.mesh import Mesh
-from pipeline.geometry.mesh_files import MeshSource, length_unit, load_mesh_file, read_surface
+from pipeline.geometry.mesh_files import MeshSource, load_mesh_file, read_surface
 from pipeline.geometry.mesh_folders import MESH_SUFFIXES
+from pipeline.geometry.units import length_unit
 
 URDF_SUFFIX = ".urdf"
 _PACKAGES = ("package://", "model://")  # of ROS and of Gazebo

@@ -11,8 +11,8 @@ from pipeline.artifacts.tensors import set_tensors, tensors_of, to_tensor
 from pipeline.errors import ContentError, MeshError
 from pipeline.geometry.catalogue import CatalogueObject, Material
 from pipeline.geometry.mesh import Mesh
-from pipeline.geometry.mesh_files import UnitSource
 from pipeline.geometry.shape import ShapeClass
+from pipeline.geometry.units import UnitSource
 from schemas.softgrip.v1 import objects_pb2
 
 TOPIC = "/objects"

@@ -130,7 +130,8 @@ def _show_object(stream: rr.RecordingStream, path: str, item: CatalogueObject, s
             f"| mass | {1e3 * item.mass_kg:.0f} g |\n"
             f"| faces, convex parts | {len(item.mesh.faces)}, {len(item.convex_parts)} |\n"
             f"| source | {item.source}, unit {item.unit} ({item.unit_known_by}) |\n"
-            f"| repairs | {repairs} |\n",
+            f"| repairs | {repairs} |\n"
+            f"| copies left out | {', '.join(item.copies) or 'none'} |\n",
             media_type=rr.MediaType.MARKDOWN,
         ),
     )

@@ -11,7 +11,7 @@ from pipeline.geometry.object_names import distinct_names, is_named, readable_na
 from pipeline.geometry.settled import Settled
 
 LABELS = st.text(
-    st.characters(codec="utf-8", exclude_characters="\0/"), min_size=1, max_size=300
+    st.characters(codec="utf-8", exclude_characters="\0/"), min_size=1, max_size=80
 ).filter(lambda part: not part.startswith("."))
 
 

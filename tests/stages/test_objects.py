@@ -126,8 +126,8 @@ def test_names_in_any_script_stay_through_files_recordings_and_added_meshes(
     chunks = RrdReader(str(stage.recording)).stream()
     drawn = {str(chunk.entity_path) for chunk in chunks}
     assert {f"/world/catalogue/{name}" for name in first} <= drawn
-    for added in ("object", "аист", "Звезда_2", "звезда 2"):
-        trimesh.creation.capsule(0.1, 0.01 + 0.001 * len(added)).export(folder / f"{added}.ply")
+    for width, added in enumerate(("object", "аист", "Звезда_2", "звезда 2")):
+        trimesh.creation.box((0.1, 0.06 + 0.01 * width, 0.02)).export(folder / f"{added}.ply")
     again = stage_context(OBJECTS, stage.folder, inputs_of, folder, workers=1)
     objects.build(again)
     second = {name: item for name, (item, _) in read_objects(again.output).items()}
@@ -151,6 +151,35 @@ def test_objects_weigh_what_a_file_says_and_keep_their_density(
     assert all(150 <= density <= 600 for density in drawn)
     with pytest.raises(ConfigError, match=r"mine\.toml is missing, and objects\.masses names it"):
         context(tmp_path / "other", mesh_dir, '[objects]\nmasses = "mine.toml"\n')
+
+
+def test_files_of_one_object_are_one_and_the_others_are_listed(tmp_path: Path) -> None:
+    """As YCB is downloaded: each object in three files."""
+    folder = tmp_path / "meshes"
+    for number in range(3):
+        solid = trimesh.creation.box((0.1, 0.05 + 0.02 * number, 0.03))
+        (folder / f"obj{number}").mkdir(parents=True)
+        for file in ("nontextured.ply", "nontextured.stl", "textured.obj"):
+            solid.export(folder / f"obj{number}" / file)
+    stage = context(tmp_path, folder, "[objects.convex]\ninput_faces = 200\n")
+    figures = objects.build(stage)
+    found = read_objects(stage.output)
+    assert set(found) == {f"obj{number}_nontextured" for number in range(3)}
+    for number in range(3):
+        item, _ = found[f"obj{number}_nontextured"]
+        assert item.source == f"obj{number}/nontextured.ply"
+        others = [f"obj{number}/nontextured.stl", f"obj{number}/textured.obj"]
+        assert list(item.copies) == figures["copies"][item.name] == others
+    stage.folder.config.write_text('[objects]\ncopies = "all"\n')
+    again = stage_context(OBJECTS, stage.folder, inputs_of, folder, workers=1)
+    objects.build(again)
+    every = read_objects(again.output)
+    assert len(every) == 9
+    families: dict[str, set[str]] = {}
+    for item, where in every.values():
+        families.setdefault(item.family, set()).add(where)
+        assert where == found[f"{item.source[:4]}_nontextured"][1]
+    assert all(len(splits) == 1 for splits in families.values())
 
 
 def test_families_are_declared_in_a_file_that_run_toml_names(
