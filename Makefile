@@ -18,7 +18,7 @@ PY      := .venv/bin/python
 
 # Without MESH_DIR, the goals that make a dataset take the embedded objects, and
 # those that use one (train, eval, ...) stay with the meshes it was made from.
-ifeq (,$(filter dataset objects scenes grasps shards bench,$(MAKECMDGOALS)))
+ifeq (,$(filter dataset objects scenes grasps shards bench holdout,$(MAKECMDGOALS)))
 MESH_DIR := $(or $(MESH_DIR),$(shell cat $(STATE)/mesh_dir 2>/dev/null))
 endif
 export RUN MESH_DIR WORKERS
@@ -29,7 +29,7 @@ ifeq (,$(strip $(WORKERS)))
 unexport WORKERS
 endif
 
-.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee review report export predict real docs lint fuzz regress clean FORCE
+.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee holdout review report export predict real docs lint fuzz regress clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -110,6 +110,12 @@ referee: .venv/.ready  ## label, p and RUN's network against what the referee fi
 	@$(PY) -m stages.referee prepare
 	@$(MAKE) --no-print-directory grasps RUN=$(RUN)/referee
 	@$(PY) -m stages.referee judge
+
+holdout: .venv/.ready  ## NETWORK=released|file on MESH_DIR, nothing trained, to runs/<run>/holdout
+	@NETWORK="$(NETWORK)" $(PY) -m stages.holdout prepare
+	@$(MAKE) --no-print-directory grasps RUN=$(RUN)/holdout
+	@$(PY) -m stages.evaluate --run $(RUN)/holdout
+	@$(PY) -m stages.holdout measure
 
 gallery: .venv/.ready  ## the nine levels on one sheet, to runs/<run>/gallery.png
 	@$(PY) -m stages.gallery

@@ -1,4 +1,4 @@
-"""Stage 6, evaluate: checkpoint → closed-loop success by level on the test clutters."""
+"""Stage 6, evaluate: checkpoint → closed-loop success by level on held-out clutters."""
 
 import os
 import shutil
@@ -33,7 +33,7 @@ from pipeline.recording.results import markdown
 from pipeline.simulation.picking import run_clutter
 from pipeline.world.scene import ClutterScene
 from schemas.softgrip.v1.evaluation_pb2 import Attempt, Comparison, LevelResult
-from stages.graph import EVALUATE, RUNS_DIR, inputs_of
+from stages.graph import EVALUATE, GIVEN_NETWORK, RUNS_DIR, inputs_of
 
 SCORE_THREADS = 1  # clutters run side by side, a worker a core
 
@@ -46,14 +46,14 @@ class ClutterJob:
     policy: PolicyName
     path: Path
     objects: Path
-    checkpoint: Path
+    network: Path
     config: RunConfig
     provenance: Provenance
 
 
 def build(stage: StageContext) -> Summary:
-    """Pick the test clutters empty in closed loop; success is judged by physics."""
-    scenes = test_clutters(stage)
+    """Pick the clutters of a split empty in closed loop; success is judged by physics."""
+    scenes = clutters(stage)
     jobs = clutter_jobs(stage, scenes)
     done = run_in_order(pick_clutter, jobs, stage.workers, stage.executor)
     parts = list(progress(done, len(jobs), "evaluate: clutters", "clutter"))
@@ -64,13 +64,14 @@ def build(stage: StageContext) -> Summary:
     return results.summary()
 
 
-def test_clutters(stage: StageContext) -> list[ClutterScene]:
-    """The clutters of the test split. Raises ArtifactError where there is none."""
-    scenes = [s for s in read_scenes(stage.upstream("scenes")) if s.split == "test"]
+def clutters(stage: StageContext) -> list[ClutterScene]:
+    """The clutters of ``evaluate.split``. Raises ArtifactError where there is none."""
+    split = stage.config.evaluate.split
+    scenes = [s for s in read_scenes(stage.upstream("scenes")) if s.split == split]
     if not scenes:
         raise ArtifactError(
-            f"{stage.upstream('scenes')} holds no test clutter",
-            "Give scenes.clutters_per_level.test at least one",
+            f"{stage.upstream('scenes')} holds no {split} clutter",
+            f"Give scenes.clutters_per_level.{split} at least one",
         )
     return scenes
 
@@ -83,7 +84,7 @@ def clutter_jobs(stage: StageContext, scenes: list[ClutterScene]) -> list[Clutte
             policy=policy,
             path=stage.folder.state("evaluate") / f"{scene.scene_id}.{policy}.mcap",
             objects=stage.upstream("objects"),
-            checkpoint=stage.upstream("train"),
+            network=stage.inputs.get(GIVEN_NETWORK) or stage.upstream("train"),
             config=stage.config,
             provenance=stage.provenance(),
         )
@@ -97,7 +98,7 @@ def pick_clutter(job: ClutterJob) -> Path:
     if is_current(job.path, job.provenance.key):
         return job.path
     objects = {name: item for name, (item, _) in catalogue(job.objects).items()}
-    score = network(job.checkpoint).predict
+    score = network(job.network).predict
     rng = generator(job.config.seed, "evaluate", job.scene.scene_id)
     made = run_clutter(job.scene, objects, job.policy, score, job.config, rng)
     scene = job.scene
@@ -117,9 +118,11 @@ def catalogue(objects: Path) -> dict[str, tuple[CatalogueObject, str]]:
 
 
 @lru_cache(maxsize=1)
-def network(checkpoint: Path) -> ControlPredictor:
-    """The trained network as exported for control, read once a worker."""
-    with open_artifact(checkpoint) as artifact:
+def network(path: Path) -> ControlPredictor:
+    """The network as exported for control, of a train artifact or given; read once a worker."""
+    if path.name == GIVEN_NETWORK:
+        return ControlPredictor(path.read_bytes(), SCORE_THREADS)
+    with open_artifact(path) as artifact:
         return ControlPredictor(artifact.attachment(EXPORT), SCORE_THREADS)
 
 

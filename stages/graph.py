@@ -74,11 +74,16 @@ SWEEP = Stage("sweep", ("seed", "network", "train", "sweep"), ("shards",), drawn
 MADE = {**STAGES, SWEEP.name: SWEEP}
 
 RUNS_DIR = Path("runs")
+# A network in a run's folder that stands in the place of one trained there; `make holdout`.
+GIVEN_NETWORK = "network.onnx"
 
 
 def inputs_of(stage: Stage, folder: RunFolder, mesh_dir: Path | None) -> dict[str, Path]:
     """Name → file of everything a stage reads."""
     inputs = {f"{name}.mcap": folder.artifact(name) for name in stage.upstream}
+    if stage is EVALUATE and (given := folder.path / GIVEN_NETWORK).is_file():
+        inputs = {n: path for n, path in inputs.items() if n != "train.mcap"}
+        inputs[GIVEN_NETWORK] = given
     if stage is OBJECTS and mesh_dir is not None:
         files = list_mesh_files(mesh_dir)
         inputs |= {f"meshes/{path.relative_to(mesh_dir).as_posix()}": path for path in files}

@@ -8,6 +8,7 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+from loguru import logger
 
 from pipeline.artifacts import ArtifactWriter, Provenance
 from pipeline.artifacts.sharding import is_current
@@ -51,24 +52,30 @@ class SceneJob:
     config: RunConfig
     provenance: Provenance
 
+    @property
+    def seed(self) -> int:
+        """What clutter and cameras are drawn from: test clutters have a seed of their own."""
+        return self.config.scenes.test_seed if self.split == "test" else self.config.seed
+
 
 def build(stage: StageContext) -> Summary:
     """Build, settle and render clutter scenes of every level, from each split's objects."""
     jobs, clock = scene_jobs(stage), BusyClock()
     with ArtifactWriter(stage.output, stage.provenance()) as artifact:
-        scenes = make_scenes(stage, jobs, artifact, clock)
+        scenes, left_out = make_scenes(stage, jobs, artifact, clock)
     shutil.rmtree(stage.folder.state("scenes"))
-    return summary(scenes) | {"render_share": clock.share()}
+    return summary(scenes) | {"left_out": left_out, "render_share": clock.share()}
 
 
 def make_scenes(
     stage: StageContext, jobs: list[SceneJob], artifact: ArtifactWriter, clock: BusyClock
-) -> list[ClutterScene]:
-    """Every scene into its own file and the artifact; returned without views.
+) -> tuple[list[ClutterScene], dict[str, str]]:
+    """Every scene into its own file and the artifact; returned without views, with what cannot be.
 
     Workers build clutters ahead; this process renders them one after the other, as a driver
     keeps the GPU or all cores busy by itself; a thread writes what is rendered.
     """
+    left_out: dict[str, str] = {}
     missing = [job for job in jobs if not is_current(job.path, job.provenance.key)]
     settled = run_in_order(settled_clutter, missing, stage.workers, stage.executor, AHEAD)
     built = iter(progress(settled, len(missing), "scenes", "scene"))
@@ -76,47 +83,57 @@ def make_scenes(
     scenes: list[ClutterScene] = []
     with ThreadPoolExecutor(1) as writer:
         writes: deque[Future[None]] = deque()
-        for number, job in enumerate(jobs):
+        for job in jobs:
             if job in missing:
-                seen = render(job, next(built), clock)
+                clutter = next(built)
+                if isinstance(clutter, SceneError):
+                    logger.warning("left out: {}: {}", job.scene_id, clutter)
+                    left_out[job.scene_id] = clutter.what
+                    continue
+                seen = render(job, clutter, clock)
                 save(job, seen, renderer)
             else:
                 seen = read_scene(job.path, 0)
-            writes.append(writer.submit(write_scene, artifact, number, seen, renderer))
+            writes.append(writer.submit(write_scene, artifact, len(scenes), seen, renderer))
             if len(writes) > WAITING_TO_BE_WRITTEN:
                 writes.popleft().result()
             scenes.append(replace(seen, views=()))
         for write in writes:
             write.result()
-    return scenes
+    if not scenes:
+        raise SceneError(
+            f"Not one of {len(jobs)} clutters can be built of {stage.upstream('objects')}: "
+            f"{next(iter(left_out.values()))}",
+            "Add meshes, or lower scenes.objects_per_clutter",
+        )
+    return scenes, left_out
 
 
 def scene_jobs(stage: StageContext) -> list[SceneJob]:
-    """Every clutter of the run, level by level; those without objects where they are refused."""
+    """Every clutter of the run, level by level."""
     counts = stage.config.scenes.clutters_per_level
+    shared = (stage.upstream("objects"), stage.config, stage.provenance())
     jobs = []
     for level in sorted(stage.config.scenes.levels):
-        for split, count in (("train", counts.train), ("val", counts.val), ("test", counts.test)):
-            for number in range(count):
+        for split in stage.config.scenes.splits:
+            for number in range(getattr(counts, split)):
                 scene_id = f"level{level}-{split}-{number:02d}"
                 path = stage.folder.state("scenes") / f"{scene_id}.mcap"
-                jobs.append(
-                    SceneJob(
-                        scene_id,
-                        level,
-                        split,
-                        path,
-                        stage.upstream("objects"),
-                        stage.config,
-                        stage.provenance(),
-                    )
-                )
-    if stage.config.scenes.without_objects == "leave out":
-        return [job for job in jobs if pool_of(job)]
+                jobs.append(SceneJob(scene_id, level, split, path, *shared))
     return jobs
 
 
-def settled_clutter(job: SceneJob) -> ClutterScene:
+def settled_clutter(job: SceneJob) -> ClutterScene | SceneError:
+    """One clutter at rest, without views; or why there is none, where such are left out."""
+    try:
+        return built_clutter(job)
+    except SceneError as error:
+        if job.config.scenes.impossible == "refused":
+            raise
+        return error
+
+
+def built_clutter(job: SceneJob) -> ClutterScene:
     """One clutter at rest, without views."""
     pool = pool_of(job)
     if not pool:
@@ -125,7 +142,7 @@ def settled_clutter(job: SceneJob) -> ClutterScene:
             f"and {job.objects} has none",
             "Add meshes, raise objects.limit, or leave the level out of scenes.levels",
         )
-    seed = derive_seed(job.config.seed, "scene", job.scene_id)
+    seed = derive_seed(job.seed, "scene", job.scene_id)
     return build_clutter(job.scene_id, job.level, job.split, pool, job.config.scenes, seed)
 
 
@@ -142,7 +159,7 @@ def pool_of(job: SceneJob) -> list[CatalogueObject]:
 def render(job: SceneJob, scene: ClutterScene, clock: BusyClock) -> ClutterScene:
     """The scene with its views."""
     objects = {name: item for name, (item, _) in catalogue(job.objects).items()}
-    rng = generator(job.config.seed, "cameras", job.scene_id)
+    rng = generator(job.seed, "cameras", job.scene_id)
     centres = np.array([placed.world_from_object[:3, 3] for placed in scene.objects])
     cameras = scene_cameras(job.config.cameras, centres, rng)
     renderer = renderer_of(job.config)

@@ -101,7 +101,7 @@ class ArmConfig(Section):
 
 
 class EvaluateConfig(Section):
-    """Closed-loop evaluation on the test clutters."""
+    """Closed-loop evaluation on the clutters of one split."""
 
     robot: RobotName = Field("floating", description="a gripper alone, or on a KUKA LBR iiwa 14")
     segmentation: Literal["none", "ideal"] = Field(
@@ -111,6 +111,9 @@ class EvaluateConfig(Section):
         "referee",
         description="what an object hangs by: what [referee] finds borne, or the label's p and "
         "Eq. (7)-(11) at suction.vacuum_pa",
+    )
+    split: Literal["test", "val"] = Field(
+        "test", description="whose clutters are picked; choices are made on val"
     )
     policies: tuple[PolicyName, ...] = Field(
         ("closed-loop", "open-loop", "geometric"), min_length=1, description="the first is judged"

@@ -1,4 +1,4 @@
-"""The configuration of the scenes and grasps that the referee judges."""
+"""The configuration of a run within a run: what the referee judges, what a network is held to."""
 
 from pipeline.config.scenes import ClutterCounts, ScenesConfig
 from pipeline.config.tree import RunConfig
@@ -7,8 +7,8 @@ from pipeline.config.tree import RunConfig
 def judged_config(config: RunConfig) -> RunConfig:
     """A run's configuration for a run within it: all meshes, as far as levels have objects.
 
-    As many clutters and labels as [agreement] wants; all levels, none for want of objects refused;
-    no objects but those of the mesh folder, and each of them.
+    As many clutters and labels as [agreement] wants; all levels, without the clutters that cannot
+    be built; no objects but those of the mesh folder, and each of them.
     """
     some = config.agreement.clutters_per_level
     counts = ClutterCounts(train=some, val=(some + 1) // 2, test=some)
@@ -24,7 +24,7 @@ def judged_config(config: RunConfig) -> RunConfig:
     scenes = {
         "clutters_per_level": counts,
         "levels": ScenesConfig().levels,
-        "without_objects": "leave out",
+        "impossible": "left out",
     }
     return config.model_copy(
         update={
@@ -32,5 +32,39 @@ def judged_config(config: RunConfig) -> RunConfig:
             "split": config.split.model_copy(update={"families": families}),
             "scenes": config.scenes.model_copy(update=scenes),
             "grasps": config.grasps.model_copy(update={"count": config.agreement.labelled}),
+        }
+    )
+
+
+def holdout_config(config: RunConfig) -> RunConfig:
+    """A run's configuration with every object in the test split, as [holdout] wants it.
+
+    What speaks of the run's own meshes is left out: families, copies, a limit, transparent names.
+    """
+    wanted = config.holdout
+    return config.model_copy(
+        update={
+            "objects": config.objects.model_copy(
+                update={
+                    "limit": 0,
+                    "embedded_in_training": False,
+                    "stretched_copies": 0,
+                    "transparent": (),
+                }
+            ),
+            "split": config.split.model_copy(update={"families": "", "all_in_test": True}),
+            "scenes": config.scenes.model_copy(
+                update={
+                    "levels": wanted.levels,
+                    "splits": ("test",),
+                    "impossible": "left out",
+                    "placement_attempts": wanted.placement_attempts,
+                    "clutters_per_level": ClutterCounts(test=wanted.clutters_per_level),
+                }
+            ),
+            "grasps": config.grasps.model_copy(update={"count": wanted.labelled}),
+            "evaluate": config.evaluate.model_copy(
+                update={"split": "test", "policies": wanted.policies}
+            ),
         }
     )

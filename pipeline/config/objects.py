@@ -107,6 +107,9 @@ class SplitConfig(Section):
     families: str = Field(
         "", description="file beside run.toml that declares families; else the mesh folder's"
     )
+    all_in_test: bool = Field(
+        False, description="every object is of the test split: nothing is trained; make holdout"
+    )
     # Measured on 47 scans and 65 embedded shapes: from 0.035 to 0.040 the families are the same
     # (balls; cubes; cans; lemon and peach; screwdrivers; ...), at 0.05 balls and cubes are one.
     family_threshold: float = Field(

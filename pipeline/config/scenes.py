@@ -25,8 +25,17 @@ class ScenesConfig(ScaledSection):
         (1, 2, 3, 4, 5, 6, 7, 8, 9), min_length=1, description="clutter levels; Table II"
     )
     clutters_per_level: ClutterCounts = ClutterCounts()
-    without_objects: Literal["refuse", "leave out"] = Field(
-        "refuse", description="a level's clutters of a split that has no object of its class"
+    splits: tuple[Literal["train", "val", "test"], ...] = Field(
+        ("train", "val", "test"), min_length=1, description="splits that clutters are built of"
+    )
+    impossible: Literal["refused", "left out"] = Field(
+        "refused",
+        description="what becomes of a run with a clutter, or of a clutter, that cannot "
+        "be built of the objects there are",
+    )
+    # Whoever draws a run's seed anew, or chooses among seeds, meets the same test clutters.
+    test_seed: int = Field(
+        20261128, ge=0, lt=2**63, description="of the test clutters, whatever the run's seed"
     )
     objects_per_clutter: int = Field(10, ge=1, le=50, description="Supplement V: 10")
     isolated_gap_min_m: float = Field(0.05, gt=0, description="Supplement V: 5 cm [m]")

@@ -33,6 +33,7 @@ from pipeline.config.grasps import (
     PadConfig,
     SensingConfig,
 )
+from pipeline.config.holdout import HoldoutConfig
 from pipeline.config.learning import NetworkConfig, ShardsConfig, SweepConfig, TrainConfig
 from pipeline.config.objects import ObjectsConfig, SplitConfig
 from pipeline.config.predict import PredictConfig
@@ -82,6 +83,7 @@ class RunConfig(Section):
     referee: RefereeConfig = RefereeConfig()
     agreement: AgreementConfig = AgreementConfig()
     evaluate: EvaluateConfig = EvaluateConfig()
+    holdout: HoldoutConfig = HoldoutConfig()
     predict: PredictConfig = PredictConfig()
     recording: RecordingConfig = RecordingConfig()
     dataset: DatasetConfig = DatasetConfig()

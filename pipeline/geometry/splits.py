@@ -41,6 +41,8 @@ def split_objects(
     """
     by_content = sorted(items, key=lambda item: item.content)
     fixed: dict[str, Split] = dict.fromkeys(added, "train")
+    if config.all_in_test:
+        fixed |= {item.source.name: "test" for item in items}
     for item in by_content:
         if item.source.name not in added and item.content in settled.splits:
             fixed[item.source.name] = settled.splits[item.content]

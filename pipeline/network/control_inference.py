@@ -8,7 +8,12 @@ import torch
 from jaxtyping import Bool, Float
 
 from pipeline.errors import ArtifactError, ContentError
-from pipeline.network.canonical import CHANNELS, network_input
+from pipeline.network.canonical import (
+    CHANNELS,
+    SYMMETRIES,
+    apply_symmetry,
+    network_input,
+)
 from pipeline.network.control_input import control_input
 from pipeline.network.export import REMEDY, check_onnx_bytes
 from pipeline.network.ga_cnn import GaCnn
@@ -62,7 +67,10 @@ class ControlPredictor:
         self._streams.set_callback(_take_quality)
 
     def predict(
-        self, cloud: Float[np.ndarray, "n h w 3"], mask: Bool[np.ndarray, "n h w"]
+        self,
+        cloud: Float[np.ndarray, "n h w 3"],
+        mask: Bool[np.ndarray, "n h w"],
+        average_symmetries: bool = False,
     ) -> Float[np.ndarray, " n"]:
         """Predicted quality q̂ in [0, 1].
 
@@ -72,6 +80,8 @@ class ControlPredictor:
             Points in GCS in units of r_G, shape (n, h, w, 3), grid as in ``canonical``.
         mask
             Cells that hold a measured point, shape (n, h, w).
+        average_symmetries
+            Mean over the eight turns and mirrors under which q does not change.
 
         Returns
         -------
@@ -88,15 +98,19 @@ class ControlPredictor:
                 f"{self._cells} by {self._cells}",
                 "Set sensing.grid_cells to what the network was trained on, or train another",
             )
-        predicted = np.empty(len(cloud), dtype=np.float32)
+        turns = SYMMETRIES if average_symmetries else 1
+        predicted = np.empty((turns, len(cloud)), dtype=np.float32)
         for start in range(0, len(cloud), _PART):
             some = slice(start, start + _PART)
             part = self._input(cloud[some], mask[some])
             if len(part) < _PART:
                 part = np.pad(part, ((0, _PART - len(part)), (0, 0), (0, 0), (0, 0)))
-            self._streams.start_async({0: part}, predicted[some])
+            for element in range(turns):
+                turned = self._turned(part, element) if element else part
+                self._streams.start_async({0: turned}, predicted[element, some])
         self._streams.wait_all()
-        return predicted
+        mean: Float[np.ndarray, " n"] = predicted.mean(axis=0)
+        return mean
 
     def _input(
         self, cloud: Float[np.ndarray, "n h w 3"], mask: Bool[np.ndarray, "n h w"]
@@ -108,6 +122,13 @@ class ControlPredictor:
             return network_input(
                 torch.from_numpy(cloud), torch.from_numpy(mask), self._channels
             ).numpy()
+
+    def _turned(
+        self, part: Float[np.ndarray, "n c h w"], element: int
+    ) -> Float[np.ndarray, "n c h w"]:
+        """An input under one symmetry of the square; see `apply_symmetry`."""
+        elements = torch.full((len(part),), element)
+        return apply_symmetry(torch.from_numpy(part), elements, self._channels).numpy()
 
 
 def check_export(

@@ -33,6 +33,7 @@ _OPERATORS = frozenset(
 )
 # Of one sample, between two layers: 512 channels of all cells are a seventh of it.
 _MOST_VALUES = 1 << 21
+_LONGEST_SHOWN = 200  # letters of a file in a message
 
 
 @dataclass(frozen=True)
@@ -155,6 +156,13 @@ def check_onnx_bytes(data: bytes) -> ExportedInput:
                     REMEDY,
                 )
             return ExportedInput(channels, sides[1])
+    if {**properties, "channels": ""} == {**_metadata(()), "channels": ""}:
+        theirs = properties.get("channels", "none")[:_LONGEST_SHOWN]
+        raise ContentError(
+            f"exported network takes the input channels {theirs}, and "
+            f"program makes {json.dumps(KNOWN_CHANNELS[0])}",
+            "Train the network again, or take one that this version trained",
+        )
     raise ContentError(
         f"exported network is marked {properties}, "
         f"this program reads {_metadata(KNOWN_CHANNELS[0])}",

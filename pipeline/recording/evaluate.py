@@ -55,7 +55,7 @@ def draw_evaluate(stage: MadeStage, figures: Mapping[str, Any]) -> None:
     names = {
         scene.scene_id: [placed.object_name for placed in scene.objects]
         for scene in read_scenes(stage.upstream("scenes"))
-        if scene.split == "test"
+        if scene.split == stage.config.evaluate.split
     }
     with open_artifact(stage.output) as artifact:
         attempts = [message for _, message in artifact.messages(Attempt)]

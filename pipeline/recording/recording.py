@@ -48,6 +48,7 @@ TIMELINES = {
     "sweep": "layers",
     "predict": "grasp",
     "referee": "grasp",
+    "holdout": "object",
 }
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
+from jaxtyping import Float, Integer
 
 from pipeline.artifacts import open_artifact
 from pipeline.messages.samples import read_split
@@ -87,8 +88,10 @@ def show_training(
         stream.log("curves/error/val", rr.Scalars(metrics.val_mae))
         stream.log("curves/error/mean_predictor", rr.Scalars(figures.mean_predictor_mae))
         stream.log("curves/rate", rr.Scalars(metrics.learning_rate))
-    _show_calibration(stream, figures)
-    _show_worst(stream, figures, test_set, wanted)
+    show_calibration(stream, figures.quality, figures.predicted, figures.calibration)
+    error = np.abs(figures.predicted - figures.quality)
+    worst = np.argsort(-error, kind="stable")[: min(wanted, SHEET_SAMPLES)]
+    show_sheet(stream, "world/worst", test_set, figures.predicted, worst)
     tenths = np.array([0.0 if error is None else error for error in figures.by_tenth])
     stream.log("curves/by_tenth", rr.BarChart(tenths, color=colours.PALETTE[0]), static=True)
     stream.log(
@@ -127,10 +130,27 @@ def result_table(figures: TestFigures) -> str:
     return f"| | mean &#124;q-hat - q&#124; | grasps |\n|-|-|-|\n{lines}\n"
 
 
-def _show_calibration(stream: rr.RecordingStream, figures: TestFigures) -> None:
-    """Test samples as dots, the tenths' means as a line; upwards is y = 1 - q-hat on a picture."""
-    every = max(1, len(figures.quality) // SCATTER_POINTS)
-    dots = np.column_stack([figures.quality, 1.0 - figures.predicted])[::every]
+def show_calibration(
+    stream: rr.RecordingStream,
+    quality: Float[np.ndarray, " n"],
+    predicted: Float[np.ndarray, " n"],
+    by_tenth: Sequence[tuple[float | None, float | None, int]],
+) -> None:
+    """Samples as dots, the tenths' means as a line; upwards is y = 1 - q-hat on a picture.
+
+    Parameters
+    ----------
+    stream
+        The recording.
+    quality
+        q, shape (n,).
+    predicted
+        q̂, shape (n,).
+    by_tenth
+        Mean q̂, mean q and count of each tenth of q̂.
+    """
+    every = max(1, len(quality) // SCATTER_POINTS)
+    dots = np.column_stack([quality, 1.0 - predicted])[::every]
     stream.log(
         "curves/calibration/samples",
         rr.Points2D(dots, radii=0.003, colors=colours.PALETTE[1]),
@@ -138,7 +158,7 @@ def _show_calibration(stream: rr.RecordingStream, figures: TestFigures) -> None:
     )
     diagonal = rr.LineStrips2D([[[0, 1], [1, 0]]], radii=0.002, colors=[120, 120, 120])
     stream.log("curves/calibration/perfect", diagonal, static=True)
-    tenths = [(q, 1.0 - p) for p, q, _ in figures.calibration if p is not None and q is not None]
+    tenths = [(q, 1.0 - p) for p, q, _ in by_tenth if p is not None and q is not None]
     stream.log(
         "curves/calibration/tenths",
         rr.LineStrips2D([tenths], radii=0.004, colors=colours.PALETTE[5]),
@@ -146,25 +166,45 @@ def _show_calibration(stream: rr.RecordingStream, figures: TestFigures) -> None:
     )
 
 
-def _show_worst(
-    stream: rr.RecordingStream, figures: TestFigures, test_set: Samples, wanted: int
+def show_sheet(
+    stream: rr.RecordingStream,
+    path: str,
+    samples: Samples,
+    predicted: Float[np.ndarray, " n"],
+    chosen: Integer[np.ndarray, " k"],
+    static: bool = True,
 ) -> None:
-    error = np.abs(figures.predicted - figures.quality)
-    for number, index in enumerate(np.argsort(-error, kind="stable")[: min(wanted, SHEET_SAMPLES)]):
+    """Clouds side by side, coloured by q, each with its q and q-hat.
+
+    Parameters
+    ----------
+    stream
+        The recording.
+    path
+        Where in the recording.
+    samples
+        The n samples.
+    predicted
+        q̂ of each, shape (n,).
+    chosen
+        Indices of those that are shown.
+    static
+        Whether they are shown at every step.
+    """
+    for number, index in enumerate(chosen):
         shift = SHEET_SPACING * np.array([number % SHEET_COLUMNS, -(number // SHEET_COLUMNS), 0])
-        points = test_set.cloud[index][test_set.cloud_mask[index]].astype(np.float32) + shift
-        colour = colours.by_value(figures.quality[index : index + 1])
+        points = samples.cloud[index][samples.cloud_mask[index]].astype(np.float32) + shift
+        colour = colours.by_value(samples.quality[index : index + 1])
+        shown = rr.Points3D(points, colors=colour, radii=0.04)
+        stream.log(f"{path}/{number:03d}", shown, static=static)
+        label = f"{samples.quality[index]:.2f} / {predicted[index]:.2f}"
         stream.log(
-            f"world/worst/{number:03d}", rr.Points3D(points, colors=colour, radii=0.04), static=True
-        )
-        label = f"{figures.quality[index]:.2f} / {figures.predicted[index]:.2f}"
-        stream.log(
-            f"world/worst/{number:03d}/label",
+            f"{path}/{number:03d}/label",
             rr.Points3D(
                 [shift + np.array([0, 1.4, 0])],
                 labels=[label],
                 radii=0.01,
                 colors=colours.PALETTE[7],
             ),
-            static=True,
+            static=static,
         )

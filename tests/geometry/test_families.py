@@ -100,3 +100,11 @@ def test_what_is_settled_is_kept_by_content_and_forgotten_on_other_grounds(tmp_p
     path.write_text("[1]")
     with pytest.raises(ConfigError, match="damaged"):
         read_settled(path, "x")
+
+
+def test_where_nothing_is_trained_every_object_is_for_test() -> None:
+    config = SplitConfig(all_in_test=True)
+    for items in ([CUBE], [BALL, SMALL_BALL, CUBE, PLATE, ROD]):
+        split, families = split_objects(items, (), (), config, 0, Settled("x"))
+        assert split == {item.source.name: "test" for item in items}
+        assert not families.joining

@@ -15,6 +15,7 @@ from pipeline.execution import run_in_order
 from pipeline.network.canonical import CHANNELS, network_input
 from pipeline.network.control_inference import ControlPredictor, check_export
 from pipeline.network.ga_cnn import GaCnn, build_network
+from pipeline.network.inference import predict
 from tests.network.planes import planes_with_holes
 from tests.network.test_hostile_checkpoints import model, node
 from tests.network.test_inference import lively
@@ -118,3 +119,12 @@ def test_nothing_is_said_or_kept(data: bytes, tmp_path: Path) -> None:
     )
     assert (ran.returncode, ran.stdout, ran.stderr) == (0, "", "")
     assert list(home.iterdir()) == []
+
+
+def test_the_mean_over_the_symmetries_is_the_networks(network: GaCnn, data: bytes) -> None:
+    few = slice(0, 11)
+    cloud, mask = SAMPLES.cloud[few], SAMPLES.mask[few]
+    averaged = ControlPredictor(data, threads=1).predict(cloud, mask, average_symmetries=True)
+    expected = predict(network, cloud, mask, 11, threads=1, average_symmetries=True)
+    np.testing.assert_allclose(averaged, expected, rtol=0, atol=1e-4)
+    assert np.abs(averaged - predicted(ControlPredictor(data, threads=1), few)).max() > 1e-4

@@ -48,7 +48,7 @@ def test_without_a_runs_own_toml_defaults_are_judged(tmp_path: Path) -> None:
     prepare("new", tmp_path)
     config = load_run_config(tmp_path / "new" / "referee" / "run.toml")
     assert config == judged_config(RunConfig())
-    assert config.scenes.without_objects == "leave out"
+    assert config.scenes.impossible == "left out"
 
 
 def test_without_a_network_the_released_one_is_asked(made: RunFolder) -> None:

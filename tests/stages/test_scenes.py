@@ -26,10 +26,27 @@ def test_clutters_without_objects_are_left_out_or_refused(
     context = stage_context(SCENES, run, inputs_of, None, workers=1)
     scenes = context.config.scenes.model_copy(update={"levels": (1, 4)})
     context = replace(context, config=context.config.model_copy(update={"scenes": scenes}))
-    refused = scene_jobs(context)
-    assert {(job.level, job.split) for job in refused} >= {(1, "train"), (4, "train"), (1, "test")}
+    wanting = next(job for job in scene_jobs(context) if job.level == 4)
     with pytest.raises(SceneError, match="Level 4 needs typical objects of the train split"):
-        settled_clutter(next(job for job in refused if job.level == 4))
-    scenes = scenes.model_copy(update={"without_objects": "leave out"})
-    context = replace(context, config=context.config.model_copy(update={"scenes": scenes}))
-    assert {(job.level, job.split) for job in scene_jobs(context)} == {(1, "train")}
+        settled_clutter(wanting)
+    scenes = scenes.model_copy(update={"impossible": "left out"})
+    config = context.config.model_copy(update={"scenes": scenes})
+    left_out = settled_clutter(replace(wanting, config=config))
+    assert isinstance(left_out, SceneError)
+    assert "Level 4 needs typical objects" in left_out.what
+
+
+def test_clutters_are_of_the_splits_that_are_wanted(run: RunFolder) -> None:
+    context = stage_context(SCENES, run, inputs_of, None, workers=1)
+    scenes = context.config.scenes.model_copy(update={"splits": ("test",)})
+    config = context.config.model_copy(update={"scenes": scenes})
+    assert {job.split for job in scene_jobs(replace(context, config=config))} == {"test"}
+
+
+def test_test_clutters_stay_whatever_the_seed_of_the_run(run: RunFolder) -> None:
+    context = stage_context(SCENES, run, inputs_of, None, workers=1)
+    other = replace(context, config=context.config.model_copy(update={"seed": 77}))
+    pairs = list(zip(scene_jobs(context), scene_jobs(other), strict=True))
+    assert {one.split for one, _ in pairs} == {"train", "val", "test"}
+    for one, two in pairs:
+        assert (one.seed == two.seed) == (one.split == "test")

@@ -1,0 +1,30 @@
+"""[holdout]: on what clutters and grasps of untrained meshes a given network is held to."""
+
+from pydantic import Field
+
+from pipeline.config.evaluation import PolicyName
+from pipeline.config.section import Section
+
+
+class HoldoutConfig(Section):
+    """Scenes, labels and attempts of `make holdout`; what is not named here is as in the run."""
+
+    levels: tuple[int, ...] = Field(
+        (1, 2, 3, 4, 5, 6, 7, 8, 9),
+        min_length=1,
+        description="clutter levels, Table II; those that the meshes cannot make are left out",
+    )
+    clutters_per_level: int = Field(2, ge=1, description="clutters of each level")
+    placement_attempts: int = Field(
+        20, ge=1, description="tries at one clutter before it is left out"
+    )
+    labelled: int = Field(9000, ge=1, description="grasps labelled, over all clutters")
+    policies: tuple[PolicyName, ...] = Field(
+        ("closed-loop",), min_length=1, description="policies that empty the clutters"
+    )
+    baseline_grasps: int = Field(
+        1000, ge=0, description="of the grasps, those that the released baseline is asked for too"
+    )
+    shown: int = Field(
+        24, ge=1, le=200, description="worst clouds of each object in the recording; 0.02 MB each"
+    )
