@@ -61,8 +61,10 @@ def build(stage: StageContext) -> Summary:
     objects += stretched
     split = plan.split | dict.fromkeys((item.name for item in stretched), "train")
     publish_bytes(settled_in, plan.settled.to_json().encode())
+    for remark in plan.remarks:
+        logger.warning("{}", remark)
     publish(stage, objects, split, refused)
-    return summary(objects, split, refused) | {"stretched_near_held_out": near}
+    return summary(objects, split, refused) | {"stretched_near_held_out": near, **plan.figures}
 
 
 def settling_basis(stage: StageContext) -> str:

@@ -50,7 +50,7 @@ class ObjectsConfig(ScaledSection):
         1.5, ge=1, le=4, description="most that a copy is stretched along one axis over another [1]"
     )
     unit: Literal["auto", "m", "cm", "mm", "in"] = Field(
-        "auto", description="length unit of mesh files that do not declare one; auto = by extent"
+        "auto", description="length unit of mesh files that declare none; auto = by all their sizes"
     )
     min_extent_m: float = Field(0.002, gt=0, description="smaller meshes are refused [m]")
     max_extent_m: float = Field(5.0, gt=0, description="larger meshes are refused [m]")

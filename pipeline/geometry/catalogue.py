@@ -25,7 +25,7 @@ from pipeline.geometry.shape import (
     shape_class,
     solid_properties,
 )
-from pipeline.geometry.units import UnitSource
+from pipeline.geometry.units import METRES_PER_UNIT, UnitSource
 
 Material = Literal["opaque", "transparent"]
 EMBEDDED = "parametric"
@@ -52,6 +52,15 @@ class MeasuredObject:
     def embedded(self) -> bool:
         """Whether it is of the embedded set, and no file's."""
         return self.source.sha256 == EMBEDDED
+
+    def in_unit(self, unit: str, config: ObjectsConfig) -> "MeasuredObject":
+        """The same object, its file read in another unit. Raises MeshError where it is too thin."""
+        source = self.source.in_unit(unit)
+        factor = METRES_PER_UNIT[unit] / METRES_PER_UNIT[self.source.unit]
+        mesh, shape = self.mesh.scaled(factor), self.descriptor
+        check_thickness(source.label, mesh, config)
+        descriptor = replace(shape, length=shape.length * factor)
+        return replace(self, source=source, mesh=mesh, descriptor=descriptor)
 
     def called(self, name: str) -> "MeasuredObject":
         """The same object under another name."""

@@ -21,6 +21,10 @@ class Mesh:
         """Sides of the axis-aligned bounding box [m]."""
         return np.asarray(np.ptp(self.vertices_m, axis=0))
 
+    def scaled(self, factor: float) -> "Mesh":
+        """A similar surface."""
+        return Mesh(self.vertices_m * factor, self.faces)
+
     def transformed(self, a_from_mesh: Float[np.ndarray, "4 4"]) -> "Mesh":
         """The same surface in frame a; a_from_mesh must not mirror."""
         vertices = self.vertices_m @ a_from_mesh[:3, :3].T + a_from_mesh[:3, 3]

@@ -1,7 +1,7 @@
 """Reading mesh files: bounded, nothing outside their folder, units declared or detected."""
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from urllib.parse import unquote
@@ -35,6 +35,16 @@ class MeshSource:
     unit_known_by: UnitSource
     notes: tuple[str, ...] = ()
     """What the object's record should say of how the file was read."""
+
+    @property
+    def extent(self) -> float:
+        """The longest extent, in the source's unit."""
+        return float(self.mesh.extents_m.max()) / METRES_PER_UNIT[self.unit]
+
+    def in_unit(self, unit: str) -> "MeshSource":
+        """The same numbers read in another unit."""
+        factor = METRES_PER_UNIT[unit] / METRES_PER_UNIT[self.unit]
+        return replace(self, mesh=self.mesh.scaled(factor), unit=unit)
 
 
 def load_mesh_file(path: Path, folder: Path, name: str, config: ObjectsConfig) -> MeshSource:

@@ -4,6 +4,7 @@ import difflib
 from collections.abc import Mapping, Sequence
 from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
+from typing import Any
 
 from pipeline.config.objects import ObjectsConfig, SplitConfig
 from pipeline.errors import ConfigError, MeshError
@@ -14,6 +15,7 @@ from pipeline.geometry.object_names import distinct_names, is_named
 from pipeline.geometry.selection import Split, choose_subset
 from pipeline.geometry.settled import Settled
 from pipeline.geometry.splits import split_objects
+from pipeline.geometry.units import FolderUnit, folder_unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +29,10 @@ class Plan:
     split: dict[str, Split]
     """Split of each object that is taken."""
     families: Families
+    unit: FolderUnit | None
+    """What the sizes of files tell that declare no unit; None where there are none."""
+    too_thin: tuple[tuple[str, MeshError], ...]
+    """Sources that are too thin in the folder's unit, and why."""
     settled: Settled
     """What the run stays with from now on."""
 
@@ -37,9 +43,20 @@ class Plan:
 
     @property
     def left_out(self) -> list[tuple[str, MeshError]]:
-        """Sources of objects that would join two splits, and why."""
+        """Sources that are no objects after all, and why: they are too thin or join two splits."""
         joining = self.families.joining
-        return [(self.measured[name].source.label, why) for name, why in joining.items()]
+        named = [(self.measured[name].source.label, why) for name, why in joining.items()]
+        return [*self.too_thin, *named]
+
+    @property
+    def remarks(self) -> list[str]:
+        """What a person should be told."""
+        return self.unit.remarks() if self.unit else []
+
+    @property
+    def figures(self) -> dict[str, Any]:
+        """For the stage's summary: the unit that sizes told."""
+        return {"detected_unit": self.unit.figures() if self.unit else {}}
 
     @property
     def held_out(self) -> dict[str, MeasuredObject]:
@@ -85,7 +102,8 @@ def plan_catalogue(
         the families.
     """
     config, splitting = configs
-    meshes = {item.source.label: item for item in items if not item.embedded}
+    unit, settled = _folder_unit(items, config, settled)
+    meshes, too_thin = _in_folder_unit([i for i in items if not i.embedded], unit, config)
     copies = find_copies(list(meshes.values()), settled.names, config.copies_rms)
     left_off = {label for of in copies.values() for label in of} if config.copies == "one" else {}
     names = distinct_names([label for label in meshes if label not in left_off], settled.names)
@@ -111,7 +129,37 @@ def plan_catalogue(
     now = settled.with_splits({measured[name].content: where for name, where in split.items()})
     now = now.with_splits(_shared_splits(contents, now.splits)).with_names(names)
     listed = {names[label]: of for label, of in copies.items() if left_off}
-    return Plan(measured, listed, split, families, now)
+    return Plan(measured, listed, split, families, unit, too_thin, now)
+
+
+def _folder_unit(
+    items: Sequence[MeasuredObject], config: ObjectsConfig, settled: Settled
+) -> tuple[FolderUnit | None, Settled]:
+    """The unit of the files that declare none, decided together, and kept."""
+    asked = [item.source for item in items if item.source.unit_known_by == "detected"]
+    if not asked:
+        return None, settled
+    contents, bounds = [at.sha256 for at in asked], (config.min_extent_m, config.max_extent_m)
+    extents = {source.label: source.extent for source in asked}
+    unit = folder_unit(extents, config, settled.unit_of(contents, bounds))
+    return unit, settled.with_unit(unit.unit, contents, bounds)
+
+
+def _in_folder_unit(
+    items: Sequence[MeasuredObject], unit: FolderUnit | None, config: ObjectsConfig
+) -> tuple[dict[str, MeasuredObject], tuple[tuple[str, MeshError], ...]]:
+    """The meshes by path, each in its folder's unit, and those that are too thin in it."""
+    found: dict[str, MeasuredObject] = {}
+    too_thin: list[tuple[str, MeshError]] = []
+    for item in items:
+        label, source = item.source.label, item.source
+        asked = source.unit_known_by == "detected"
+        wanted = unit.of(label) if unit and asked else source.unit
+        try:
+            found[label] = item if wanted == source.unit else item.in_unit(wanted, config)
+        except MeshError as error:
+            too_thin.append((label, error))
+    return found, tuple(too_thin)
 
 
 def _shared_splits(
