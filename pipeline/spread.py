@@ -1,7 +1,7 @@
 """Some of many things, evenly spread over all of them."""
 
 
-def spread(total: int, wanted: int) -> list[int]:
+def choose_evenly(total: int, wanted: int) -> list[int]:
     """Indices of at most ``wanted`` items, evenly spread over ``total``."""
     if total <= wanted:
         return list(range(total))

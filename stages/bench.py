@@ -60,7 +60,7 @@ class Bench:
 
 def measure_all() -> None:
     """Measure, print the table, write bench.json."""
-    bench = opened(RunFolder(RUNS_DIR / "bench"))
+    bench = open_bench(RunFolder(RUNS_DIR / "bench"))
     config, scene = bench.config, bench.scenes[-1]
     samples = stored_samples(bench)
     figures: dict[str, object] = {"cores": len(os.sched_getaffinity(0))}
@@ -87,7 +87,7 @@ def measure_all() -> None:
     sys.stdout.write(f"peak memory {figures['peak_memory_mib']} MiB; all of it in {path}\n")
 
 
-def opened(folder: RunFolder) -> Bench:
+def open_bench(folder: RunFolder) -> Bench:
     """The run's scenes and meshes."""
     objects = read_objects(folder.artifact("objects"))
     return Bench(
@@ -172,7 +172,7 @@ def scaling(bench: Bench) -> dict[str, object]:
 
 def worker_rate(job: WorkerJob) -> float:
     """Labelled grasps a second of one worker, rays included, once it is warm."""
-    bench = opened(job.folder)
+    bench = open_bench(job.folder)
     config, scene = bench.config, bench.scenes[job.scene]
     surfaces = surfaces_of(bench, scene)
     surface = visible_surface(scene.views[0], surfaces, config.gripper.pad.radius_m)

@@ -29,7 +29,7 @@ from pipeline.messages.scenes import read_scenes
 from pipeline.messages.training import EXPORT
 from pipeline.network.control_inference import ControlPredictor
 from pipeline.recording.evaluate import draw_evaluate
-from pipeline.recording.results import markdown
+from pipeline.recording.results import results_markdown
 from pipeline.simulation.picking import run_clutter
 from pipeline.world.scene import ClutterScene
 from schemas.softgrip.v1.evaluation_pb2 import Attempt, Comparison, LevelResult
@@ -151,7 +151,7 @@ def print_table(folder: RunFolder) -> None:
         levels = [message for _, message in artifact.messages(LevelResult, "/levels")]
         policies = [message for _, message in artifact.messages(LevelResult, "/policies")]
         comparisons = [message for _, message in artifact.messages(Comparison)]
-    sys.stdout.write(markdown(levels, policies, comparisons))
+    sys.stdout.write(results_markdown(levels, policies, comparisons))
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.messages.objects import read_objects
 from pipeline.messages.scenes import read_scenes
 from pipeline.recording.gallery import contact_sheet
-from pipeline.sensing.rendering import new_renderer, rendered
+from pipeline.sensing.rendering import new_renderer, render_views
 from pipeline.world.cameras import PinholeCamera, camera_at
 from pipeline.world.scene import ClutterScene
 from stages.graph import RUNS_DIR
@@ -53,7 +53,7 @@ def make_gallery(folder: RunFolder) -> None:
         first.setdefault(scene.level, scene)
     renderer = new_renderer(config.cameras.renderer, config.scenes)
     pictures = {
-        level: rendered(scene, objects, (portrait_camera(scene, objects),), renderer)
+        level: render_views(scene, objects, (portrait_camera(scene, objects),), renderer)
         .views[0]
         .colour
         for level, scene in first.items()

@@ -33,7 +33,7 @@ from pipeline.messages.grasps import grasp_batch, grasps_of, pads_message
 from pipeline.messages.objects import read_objects
 from pipeline.messages.scenes import read_scene, scene_count
 from pipeline.recording.grasps import draw_grasps
-from pipeline.spread import spread
+from pipeline.spread import choose_evenly
 from pipeline.stopwatch import Stopwatch
 from pipeline.world.raycasting import RayScene
 from schemas.softgrip.v1.grasps_pb2 import GraspBatch
@@ -73,7 +73,7 @@ def build(stage: StageContext) -> Summary:
     scenes = stage.upstream("scenes")
     count = scene_count(scenes)
     share, more = divmod(stage.config.grasps.count, count)
-    recorded = spread(count, SHOWN_SCENES)
+    recorded = choose_evenly(count, SHOWN_SCENES)
     pads = max(1, stage.config.recording.grasps // len(recorded))
     jobs = [
         ShardJob(
@@ -127,7 +127,7 @@ def draped_pads(
 ) -> ShownPads:
     """Pads of some of a scene's grasps, from its worst label to its best, draped again."""
     quality = np.concatenate([batch.quality for batch in grasps])
-    chosen = np.argsort(quality, kind="stable")[spread(len(quality), pads)]
+    chosen = np.argsort(quality, kind="stable")[choose_evenly(len(quality), pads)]
     return drape_again(grasps, chosen, surfaces, config)
 
 

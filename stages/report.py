@@ -16,7 +16,7 @@ from pipeline.reporting.facts import read_catalogue, read_origins, read_success,
 from pipeline.reporting.failures import failures_of
 from pipeline.reporting.figures import figures_of, overall_rates
 from pipeline.reporting.page import html_page, markdown_page
-from pipeline.reporting.words import headline, mixed_parts, words_on_meshes
+from pipeline.reporting.words import describe_meshes, headline, mixed_parts
 from stages.graph import MADE, RUNS_DIR
 
 GOALS = {"evaluate": "eval"}  # what `make` calls a stage, where it is another word
@@ -56,7 +56,7 @@ def make_report(folder: RunFolder) -> Path:
         failures_of(folder, config, next(iter(success)), FAILURES) if success else ([], {})
     )
     provenance = read_origins([folder.artifact(name) for name in names])
-    meshes, licence, licence_text = words_on_meshes(folder, config, catalogue)
+    meshes, licence, licence_text = describe_meshes(folder, config, catalogue)
     title = config.dataset.title or f"softgrip, run {run}"
     text = markdown_page(
         "report.md.jinja",

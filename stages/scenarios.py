@@ -20,8 +20,8 @@ from pipeline.config.evaluation import PolicyName
 from pipeline.control.decision import Cause
 from pipeline.control.success import success_rate
 from pipeline.execution import RunFolder, generator, progress, run_command, run_in_order
-from pipeline.simulation.picking import Clutter, strategy_of
-from pipeline.simulation.scenarios import SCENARIOS, seeing, trials
+from pipeline.simulation.picking import Clutter, build_strategy
+from pipeline.simulation.scenarios import SCENARIOS, make_trials, with_segmentation
 from stages.evaluate import network
 from stages.graph import RUNS_DIR
 
@@ -62,7 +62,7 @@ def scenarios(
         for index in range(len(SCENARIOS))
         for policy in config.evaluate.policies
     ]
-    done = run_in_order(tried, jobs, workers)
+    done = run_in_order(run_scenario, jobs, workers)
     rows = list(progress(done, len(jobs), "scenarios", "row"))
     text = table(rows)
     publish_bytes(folder.path / "scenarios.md", text.encode())
@@ -71,20 +71,20 @@ def scenarios(
     sys.stdout.write(text)
 
 
-def tried(job: ScenarioJob) -> Row:
+def run_scenario(job: ScenarioJob) -> Row:
     """One attempt at each trial."""
     scenario = SCENARIOS[job.index]
-    config = seeing(job.config, scenario)
-    strategy = strategy_of(job.policy, network(job.checkpoint).predict, config)
+    config = with_segmentation(job.config, scenario)
+    strategy = build_strategy(job.policy, network(job.checkpoint).predict, config)
     # The same scenes for every policy, and for the same things seen otherwise.
     rng = generator(config.seed, "scenario", scenario.name.removesuffix(", segmented"))
-    scenes = trials(scenario, job.trials, job.config.objects.density_kg_m3, rng)
+    scenes = make_trials(scenario, job.trials, job.config.objects.density_kg_m3, rng)
     causes: Counter[str] = Counter()
     for scene, objects in scenes:
         rng = generator(config.seed, "attempt", scene.scene_id)
         clutter = Clutter(scene, objects, config, rng)
         clutter.gripper.conveyor_m_s = scenario.speed_m_s
-        causes[str(clutter.attempted(strategy, []).cause)] += 1
+        causes[str(clutter.make_attempt(strategy, []).cause)] += 1
     lifted = causes.pop(str(Cause.LIFTED), 0)
     return Row(scenario.name, job.policy, lifted, job.trials, dict(sorted(causes.items())))
 

@@ -31,7 +31,7 @@ from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.messages.objects import read_objects
 from pipeline.messages.scenes import read_scene, write_scene
 from pipeline.recording.scenes import draw_scenes
-from pipeline.sensing.rendering import Renderer, new_renderer, rendered
+from pipeline.sensing.rendering import Renderer, new_renderer, render_views
 from pipeline.world.cameras import scene_cameras
 from pipeline.world.scene import ClutterScene
 from stages.graph import SCENES, inputs_of
@@ -164,7 +164,7 @@ def render(job: SceneJob, scene: ClutterScene, clock: BusyClock) -> ClutterScene
     cameras = scene_cameras(job.config.cameras, centres, rng)
     renderer = renderer_of(job.config)
     with clock.busy():
-        return rendered(scene, objects, cameras, renderer)
+        return render_views(scene, objects, cameras, renderer)
 
 
 def save(job: SceneJob, scene: ClutterScene, renderer: str) -> None:

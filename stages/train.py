@@ -42,7 +42,7 @@ def build(stage: StageContext, ranks: Ranks = ALONE) -> Summary:
         train_set.tensors,
         val_set.tensors,
         stage.folder.state("train"),
-        tell,
+        print_epoch,
         ranks,
         # On a CPU readers would take the cores that train.
         loader_workers=max(stage.workers // ranks.count, 1) if on_gpu else 0,
@@ -72,7 +72,7 @@ def split_of(stage: StageContext, split: str) -> Samples:
     return cached_split(stage.upstream("shards"), split, stage.folder.state(SAMPLES))
 
 
-def tell(epoch: EpochMetrics) -> None:
+def print_epoch(epoch: EpochMetrics) -> None:
     """One line an epoch."""
     logger.info(
         "train: epoch {:3d}  train |e| {:.4f}  val |e| {:.4f}  rate {:.2e}",

@@ -5,8 +5,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from pipeline.clutter.building import drawn
-from pipeline.clutter.dropping import pile
+from pipeline.clutter.building import draw_items
+from pipeline.clutter.dropping import drop_pile
 from pipeline.config.scenes import ScenesConfig
 from pipeline.errors import SceneError
 from pipeline.geometry.catalogue import CatalogueObject
@@ -37,10 +37,10 @@ def settling_speed(
     rng = np.random.default_rng(seed)
     simulated_s = wall_s = 0.0
     for _ in range(piles):
-        items = drawn(pool, config.objects_per_clutter, rng)
+        items = draw_items(pool, config.objects_per_clutter, rng)
         started = time.perf_counter()
         try:
-            _, _, settled_s = pile(items, config, rng)
+            _, _, settled_s = drop_pile(items, config, rng)
         except SceneError:
             continue
         wall_s += time.perf_counter() - started

@@ -13,8 +13,8 @@ from pipeline.control.ranking import NetworkRanking
 from pipeline.control.viewpoints import gripper_above
 from pipeline.geometry.mesh import Mesh
 from pipeline.network.control_inference import ControlPredictor
-from pipeline.sensing.depth_by_rays import measured, window_around
-from pipeline.simulation.eyes import gripper_from_camera, moved
+from pipeline.sensing.depth_by_rays import measure_depth, window_around
+from pipeline.simulation.eyes import gripper_from_camera, place_camera
 from pipeline.world.cameras import camera_at
 from pipeline.world.posed_bodies import PosedBodies
 from pipeline.world.scene import ClutterScene
@@ -72,10 +72,10 @@ def step_ms(
         # All the way down, as far as the camera sees.
         for height_m in np.arange(config.evaluate.policy.standoff_m, 0.11, -step_m):
             pose = gripper_above(aim[:3, 3], height_m, np.eye(4))
-            camera = moved(on_wrist, pose @ gripper_from_camera(config.evaluate.hand))
+            camera = place_camera(on_wrist, pose @ gripper_from_camera(config.evaluate.hand))
             times: list[float] = [time.perf_counter()]
             window = window_around(camera, aim[:3, 3], config.evaluate.policy.look_m)
-            depth_m, _ = measured(window, surfaces, None, rng)
+            depth_m, _ = measure_depth(window, surfaces, None, rng)
             picture = DepthPicture(depth_m, window)
             times.append(time.perf_counter())
             found = local.look(picture, aim)

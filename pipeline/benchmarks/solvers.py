@@ -91,9 +91,9 @@ def milliseconds(problems: list[QualityProblem], few: dict[SolverName, int]) -> 
         solve = SOLVERS[name]
         solve(chosen[0])
 
-        def all_of_them(solve=solve, chosen=chosen) -> None:  # type: ignore[no-untyped-def]
+        def solve_all(solve=solve, chosen=chosen) -> None:  # type: ignore[no-untyped-def]
             for problem in chosen:
                 solve(problem)
 
-        figures[name] = 1e3 * seconds_of(all_of_them, 2) / len(chosen)
+        figures[name] = 1e3 * seconds_of(solve_all, 2) / len(chosen)
     return figures

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from pipeline.clutter.dropping import drop_again, pile, resting_pose
+from pipeline.clutter.dropping import drop_again, drop_pile, resting_pose
 from pipeline.clutter.gaps import Surface, nearest_gaps_m, pairwise_gaps_m, penetration_m
 from pipeline.clutter.levels import Distribution, level_of
 from pipeline.clutter.placement import place_isolated, place_multiple
@@ -61,13 +61,13 @@ def build_clutter(
     rng = np.random.Generator(np.random.PCG64(seed))
     reason = "none was tried"
     for _ in range(config.placement_attempts):
-        items = drawn(pool, config.objects_per_clutter, rng)
+        items = draw_items(pool, config.objects_per_clutter, rng)
         try:
             if distribution is Distribution.STACKED:
-                poses, settle_time_s = _stacked(items, config, rng)
+                poses, settle_time_s = _settle_pile(items, config, rng)
             else:
-                poses, settle_time_s = _standing(items, distribution, config, rng)
-            gaps = measured(items, poses, distribution, config)
+                poses, settle_time_s = _settle_placed(items, distribution, config, rng)
+            gaps = measure_gaps(items, poses, distribution, config)
         except SceneError as error:
             reason = error.what
             continue
@@ -94,7 +94,7 @@ def build_clutter(
     )
 
 
-def drawn(
+def draw_items(
     pool: Sequence[CatalogueObject], count: int, rng: np.random.Generator
 ) -> list[CatalogueObject]:
     """``count`` objects in random order, with as few repeats as the pool allows."""
@@ -102,7 +102,7 @@ def drawn(
     return [pool[int(i)] for i in np.concatenate(rounds)[:count]]
 
 
-def measured(
+def measure_gaps(
     items: Sequence[CatalogueObject],
     poses: Sequence[Float[np.ndarray, "4 4"]],
     distribution: Distribution,
@@ -144,7 +144,7 @@ def measured(
     return gaps
 
 
-def _standing(
+def _settle_placed(
     items: Sequence[CatalogueObject],
     distribution: Distribution,
     config: ScenesConfig,
@@ -164,11 +164,11 @@ def _standing(
     return [body.world_from_object for body in bodies], settle_time_s
 
 
-def _stacked(
+def _settle_pile(
     items: Sequence[CatalogueObject], config: ScenesConfig, rng: np.random.Generator
 ) -> tuple[list[Float[np.ndarray, "4 4"]], float]:
     """SE(3): a pile; what lies apart from it is dropped onto it again."""
-    world, bodies, settle_time_s = pile(items, config, rng)
+    world, bodies, settle_time_s = drop_pile(items, config, rng)
     surfaces = [Surface(item.mesh) for item in items]
     poses: list[Float[np.ndarray, "4 4"]] = []
     gaps = None

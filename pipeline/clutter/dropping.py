@@ -58,7 +58,7 @@ def resting_pose(
     raise SceneError(f"{item.name} never comes to rest on the table", "Leave this mesh out")
 
 
-def pile(
+def drop_pile(
     items: Sequence[CatalogueObject], config: ScenesConfig, rng: np.random.Generator
 ) -> tuple[sapien.Scene, list[Body], float]:
     """Objects dropped one by one in SE(3) into a column of walls, which then goes away.

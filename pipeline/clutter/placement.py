@@ -57,8 +57,8 @@ def place_isolated(
     order = np.argsort([-np.ptp(s.mesh.vertices_m, axis=0).max() for s in surfaces], kind="stable")
     for index in (int(i) for i in order):
         for _ in range(_DARTS_PER_OBJECT):
-            pose = turned(resting[index], rng.uniform(0, 2 * np.pi))
-            pose = moved(pose, *_inside(surfaces[index], pose, config, rng))
+            pose = turn_pose(resting[index], rng.uniform(0, 2 * np.pi))
+            pose = move_pose(pose, *_inside(surfaces[index], pose, config, rng))
             needed = config.isolated_gap_min_m + _MARGIN_M
             box = bounds_of(surfaces[index].mesh, pose)
             if all(
@@ -109,14 +109,14 @@ def place_multiple(
     SceneError
         An object found no place on the table.
     """
-    placed = [turned(resting[0], rng.uniform(0, 2 * np.pi))]
+    placed = [turn_pose(resting[0], rng.uniform(0, 2 * np.pi))]
     for index in range(1, len(surfaces)):
         for _ in range(_SLIDES_PER_OBJECT):
             wanted = rng.uniform(_MARGIN_M, config.multiple_gap_max_m - 2 * _MARGIN_M)
-            pose = turned(resting[index], rng.uniform(0, 2 * np.pi))
+            pose = turn_pose(resting[index], rng.uniform(0, 2 * np.pi))
             target = placed[int(rng.integers(index))][:2, 3]
             start = _outside(surfaces[: index + 1], placed, rng.uniform(0, 2 * np.pi))
-            pose = moved(pose, *start)
+            pose = move_pose(pose, *start)
             arrived = _slide(surfaces, placed, index, pose, target, wanted)
             if arrived is not None and _on_workspace(surfaces[index], arrived, config):
                 placed.append(arrived)
@@ -130,7 +130,7 @@ def place_multiple(
     return placed
 
 
-def turned(pose: Float[np.ndarray, "4 4"], yaw_rad: float) -> Float[np.ndarray, "4 4"]:
+def turn_pose(pose: Float[np.ndarray, "4 4"], yaw_rad: float) -> Float[np.ndarray, "4 4"]:
     """The pose turned about the vertical through its own origin, which moves to x = y = 0."""
     out = pose.copy()
     out[:3, :3] = Rotation.from_euler("z", yaw_rad).as_matrix() @ pose[:3, :3]
@@ -138,7 +138,7 @@ def turned(pose: Float[np.ndarray, "4 4"], yaw_rad: float) -> Float[np.ndarray, 
     return out
 
 
-def moved(pose: Float[np.ndarray, "4 4"], x_m: float, y_m: float) -> Float[np.ndarray, "4 4"]:
+def move_pose(pose: Float[np.ndarray, "4 4"], x_m: float, y_m: float) -> Float[np.ndarray, "4 4"]:
     """The pose with its origin above (x, y)."""
     out = pose.copy()
     out[:2, 3] = x_m, y_m
@@ -177,7 +177,7 @@ def _slide(
         if excess < 0 or left <= 0:
             return None
         step = max(excess, _ARRIVED_M / 2)
-        pose = moved(pose, *(pose[:2, 3] + step * way))
+        pose = move_pose(pose, *(pose[:2, 3] + step * way))
         left -= step
     return None
 

@@ -18,9 +18,9 @@ FREE_GIB_WANTED = 5  # environment, caches and a run of paper
 RENDER_TRIAL = """
 from pipeline.config import ScenesConfig, StaticCameraConfig
 from pipeline.world.cameras import static_cameras
-from pipeline.sensing.sapien_rendering import rendered_table
+from pipeline.sensing.sapien_rendering import render_table
 
-seen = rendered_table(ScenesConfig(), static_cameras(StaticCameraConfig())[0])
+seen = render_table(ScenesConfig(), static_cameras(StaticCameraConfig())[0])
 raise SystemExit(0 if (seen.depth_m > 0).any() else "the table is not in the picture")
 """
 TRIAL_TIMEOUT_S = 120  # a first picture compiles shaders; a driver that hangs takes no longer

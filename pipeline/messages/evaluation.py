@@ -5,7 +5,7 @@ import numpy as np
 from pipeline.artifacts.tensors import to_tensor
 from pipeline.control.cloud import DepthPicture
 from pipeline.control.decision import Cause
-from pipeline.simulation.picking import Made
+from pipeline.simulation.picking import JudgedAttempt
 from pipeline.world.cameras import thinned
 from schemas.softgrip.v1 import evaluation_pb2
 
@@ -13,7 +13,7 @@ PICTURE_EVERY = 4  # pixels a side: a film needs to show what was seen, not to m
 
 
 def attempt_message(
-    scene_id: str, level: int, bodies: int, number: int, policy: str, made: Made
+    scene_id: str, level: int, bodies: int, number: int, policy: str, made: JudgedAttempt
 ) -> evaluation_pb2.Attempt:
     """The message of one attempt. bodies : of the scene, when it was whole."""
     lifted = made.cause is Cause.LIFTED

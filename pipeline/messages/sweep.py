@@ -83,7 +83,7 @@ def sweep_summary(
 ) -> dict[str, Any]:
     """The study's headline figures; ``times_ms`` is each network's time a grasp."""
     rows = [
-        {**plain(network), "ms_a_grasp": time_ms}
+        {**plain_values(network), "ms_a_grasp": time_ms}
         for network, time_ms in zip(networks, times_ms, strict=True)
     ]
     ablation = {
@@ -98,12 +98,12 @@ def sweep_summary(
     return {
         "chosen": next(row for row in rows if row["chosen"]),
         "ablation": ablation,
-        "budget": plain(budget),
+        "budget": plain_values(budget),
         "networks": rows,
     }
 
 
-def plain(message: SweepNetwork | SweepBudget) -> dict[str, Any]:
+def plain_values(message: SweepNetwork | SweepBudget) -> dict[str, Any]:
     """A message's values by name, those at their default too; curves stay in the artifact."""
     fields = MessageToDict(
         message, preserving_proto_field_name=True, always_print_fields_with_no_presence=True

@@ -15,7 +15,7 @@ from pipeline.physics.vulkan import MANIFEST_FOLDERS, new_render_system
 DIGEST_LENGTH = 12  # hexadecimal digits that tell two drivers apart
 
 
-def tried_renderer() -> str:
+def try_renderer() -> str:
     """SAPIEN with its device and the driver files behind it; empty where it cannot render."""
     try:
         system = new_render_system()
@@ -44,7 +44,7 @@ def loaded_drivers() -> list[Path]:
 
 def main() -> None:
     """Print what was found, and the files and folders that it depends on."""
-    renderer = tried_renderer()
+    renderer = try_renderer()
     watched = [str(path) for path in (*MANIFEST_FOLDERS, *manifests(), *loaded_drivers())]
     sys.stdout.write(json.dumps({"renderer": renderer, "watched": watched}))
 

@@ -19,15 +19,15 @@ from pipeline.messages.objects import read_objects
 from pipeline.messages.scenes import read_scenes
 from pipeline.recording import colours
 from pipeline.recording.recording import (
-    MadeStage,
-    looking,
+    FinishedStage,
+    eye_at,
     name_curve,
-    numbered,
     recording,
-    step,
+    set_step,
+    start_path,
     time_panel,
 )
-from pipeline.recording.results import markdown
+from pipeline.recording.results import results_markdown
 from pipeline.recording.robot import (
     GRIPPER,
     ShownRobot,
@@ -37,7 +37,7 @@ from pipeline.recording.robot import (
     show_gripper,
 )
 from pipeline.recording.shapes import shown_mesh, shown_pose
-from pipeline.spread import spread
+from pipeline.spread import choose_evenly
 from schemas.softgrip.v1.evaluation_pb2 import Attempt, Comparison, DepthPicture, LevelResult
 
 TIMELINE = "frame"
@@ -47,7 +47,7 @@ CAMERAS = ("static_0", "wrist")
 STATES = ("observe", "pregrasp", "approach", "seal", "lift", "shake", "done")
 
 
-def draw_evaluate(stage: MadeStage, figures: Mapping[str, Any]) -> None:
+def draw_evaluate(stage: FinishedStage, figures: Mapping[str, Any]) -> None:
     """Draw the film and the table from the finished evaluation."""
     meshes = {
         name: item.mesh for name, (item, _) in read_objects(stage.upstream("objects")).items()
@@ -63,8 +63,8 @@ def draw_evaluate(stage: MadeStage, figures: Mapping[str, Any]) -> None:
         policies = [message for _, message in artifact.messages(LevelResult, "/policies")]
         comparisons = [message for _, message in artifact.messages(Comparison)]
     ordered = worst_first(attempts)
-    shown = [ordered[i] for i in spread(len(ordered), stage.config.recording.attempts)]
-    text = markdown(levels, policies, comparisons)
+    shown = [ordered[i] for i in choose_evenly(len(ordered), stage.config.recording.attempts)]
+    text = results_markdown(levels, policies, comparisons)
     scale = stage.config.gripper.pad.radius_m / PadConfig().radius_m
     view = blueprint(stage.config.evaluate.robot == "iiwa14", scale)
     with recording(stage, view) as stream:
@@ -98,7 +98,7 @@ def blueprint(with_arm: bool = False, scale: float = 1.0) -> rrb.Blueprint:
             rrb.Spatial3DView(
                 origin="/world",
                 name="Scene, gripper and its path, candidates by q-hat",
-                eye_controls=looking(eye_m, target_m),
+                eye_controls=eye_at(eye_m, target_m),
             ),
             rrb.Vertical(
                 rrb.TextDocumentView(origin="/notes/attempt", name="Attempt"),
@@ -145,8 +145,8 @@ def show_attempts(
         show_arm(stream)
     frame = 0
     for number, made in enumerate(attempts):
-        step(stream, TIMELINE, frame)
-        objects = numbered(stream, "world/objects", number)
+        set_step(stream, TIMELINE, frame)
+        objects = start_path(stream, "world/objects", number)
         for index, name in enumerate(names[made.scene_id]):
             colour = colours.by_index(index + 1)
             stream.log(f"{objects}/{index + 1:02d}", shown_mesh(meshes[name], colour))
@@ -218,7 +218,7 @@ def _show_motion(stream: rr.RecordingStream, objects: str, made: Attempt, first:
         until = int(gone[0]) if gone.size else len(path)
         send_poses(stream, TIMELINE, body, frames[:until], bodies[:until, index])
         if gone.size:
-            step(stream, TIMELINE, int(frames[until]))
+            set_step(stream, TIMELINE, int(frames[until]))
             stream.log(body, rr.Clear(recursive=True))
     send_poses(stream, TIMELINE, GRIPPER, frames, path)
     wrench = from_tensor(made.base_wrench)

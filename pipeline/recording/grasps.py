@@ -27,16 +27,16 @@ from pipeline.messages.objects import read_objects
 from pipeline.messages.scenes import read_placed
 from pipeline.recording import colours
 from pipeline.recording.recording import (
-    MadeStage,
-    looking,
+    FinishedStage,
+    eye_at,
     name_curve,
-    numbered,
     recording,
-    step,
+    set_step,
+    start_path,
     time_panel,
 )
 from pipeline.recording.shapes import shown_mesh, shown_pose
-from pipeline.spread import spread
+from pipeline.spread import choose_evenly
 from pipeline.world.scene import PlacedObject
 from schemas.softgrip.v1.grasps_pb2 import DrapedPads, GraspBatch
 
@@ -75,13 +75,13 @@ class ShownGrasp:
     pad_pressure: Float[np.ndarray, " t"]
 
 
-def draw_grasps(stage: MadeStage, figures: Mapping[str, Any]) -> None:
+def draw_grasps(stage: FinishedStage, figures: Mapping[str, Any]) -> None:
     """Draw the recording from the finished shards that hold draped pads."""
     objects = read_objects(stage.upstream("objects"))
     meshes = {name: item.mesh for name, (item, _) in objects.items()}
     index = read_index(stage.output)
     shown: list[ShownGrasp] = []
-    for scene in spread(len(index.shards), SHOWN_SCENES):
+    for scene in choose_evenly(len(index.shards), SHOWN_SCENES):
         placed = read_placed(stage.upstream("scenes"), scene)
         shown += shown_grasps(placed, stage.output.parent / index.shards[scene].path)
     with recording(stage, blueprint()) as stream:
@@ -109,7 +109,7 @@ def blueprint() -> rrb.Blueprint:
             rrb.Spatial3DView(
                 origin="/world",
                 name=VIEW,
-                eye_controls=looking((-0.09, -0.13, 0.11), (0.0, 0.0, -0.01)),
+                eye_controls=eye_at((-0.09, -0.13, 0.11), (0.0, 0.0, -0.01)),
             ),
             rrb.Vertical(
                 rrb.TextDocumentView(origin="/notes/grasp", name="Grasp"),
@@ -143,8 +143,8 @@ def show_grasps(
     corners = {name: meshes[name].vertices_m for name in names}
     boxes = {name: np.array([v.min(axis=0), v.max(axis=0)]) for name, v in corners.items()}
     for number, shown in enumerate(ordered):
-        step(stream, TIMELINE, number)
-        objects = numbered(stream, "world/objects", number)
+        set_step(stream, TIMELINE, number)
+        objects = start_path(stream, "world/objects", number)
         _show_surroundings(stream, objects, shown, meshes, boxes)
         stream.log("curves/limits", rr.BarChart(_limits_used(shown)))
     steps = [rr.TimeColumn(TIMELINE, sequence=np.arange(len(ordered)))]

@@ -12,25 +12,25 @@ from pipeline.geometry.shape import COMPLEX_FROM, TYPICAL_FROM
 from pipeline.messages.objects import read_objects
 from pipeline.recording import colours
 from pipeline.recording.recording import (
-    MadeStage,
-    looking,
+    FinishedStage,
+    eye_at,
     name_curve,
-    numbered,
     recording,
-    step,
+    set_step,
+    start_path,
     time_panel,
 )
 from pipeline.recording.shapes import shown_facets, shown_mesh
-from pipeline.spread import spread
+from pipeline.spread import choose_evenly
 
 TIMELINE = "object"
 SPACING_M = 0.22  # between two objects on the sheet: a third more than the longest
 
 
-def draw_objects(stage: MadeStage, figures: Mapping[str, Any]) -> None:
+def draw_objects(stage: FinishedStage, figures: Mapping[str, Any]) -> None:
     """Draw the recording from the finished catalogue."""
     items = list(read_objects(stage.output).values())
-    shown = [items[i] for i in spread(len(items), stage.config.recording.objects)]
+    shown = [items[i] for i in choose_evenly(len(items), stage.config.recording.objects)]
     opening = blueprint(len(shown), max(item.nsvr for item, _ in shown))
     with recording(stage, opening) as stream:
         show_catalogue(stream, shown)
@@ -44,7 +44,7 @@ def blueprint(objects: int, greatest_nsvr: float) -> rrb.Blueprint:
             rrb.Spatial3DView(
                 origin="/world/catalogue",
                 name="Catalogue, coloured by class, NSVR growing",
-                eye_controls=looking(
+                eye_controls=eye_at(
                     (middle, -2.7 * middle - 0.15, 1.5 * middle + 0.15), (middle, -middle, 0.0)
                 ),
             ),
@@ -52,7 +52,7 @@ def blueprint(objects: int, greatest_nsvr: float) -> rrb.Blueprint:
                 rrb.Spatial3DView(
                     origin="/world/object",
                     name="Object (left) and its convex parts",
-                    eye_controls=looking((0.1, -0.25, 0.15), (0.1, 0.0, 0.0)),
+                    eye_controls=eye_at((0.1, -0.25, 0.15), (0.1, 0.0, 0.0)),
                 ),
                 rrb.TimeSeriesView(
                     origin="/curves/nsvr",
@@ -82,7 +82,7 @@ def show_catalogue(
         label = f"{shape_class} from {threshold}"
         name_curve(stream, f"curves/nsvr/{name}", label, colours.SHAPE_CLASS[shape_class])
         for index in range(len(items)):
-            step(stream, TIMELINE, index)
+            set_step(stream, TIMELINE, index)
             stream.log(f"curves/nsvr/{name}", rr.Scalars(threshold))
     for shape_class, colour in colours.SHAPE_CLASS.items():
         stream.log(
@@ -107,8 +107,8 @@ def show_catalogue(
             ),
             static=True,
         )
-        step(stream, TIMELINE, index)
-        _show_object(stream, numbered(stream, "world/object", index), item, split)
+        set_step(stream, TIMELINE, index)
+        _show_object(stream, start_path(stream, "world/object", index), item, split)
 
 
 def _show_object(stream: rr.RecordingStream, path: str, item: CatalogueObject, split: str) -> None:

@@ -9,7 +9,7 @@ from pipeline.camera.proposals import pixels_of
 from pipeline.geometry.transforms import invert, transform_points
 from pipeline.recording import colours
 from pipeline.recording.overlay import depth_picture
-from pipeline.recording.recording import looking, step, time_panel
+from pipeline.recording.recording import eye_at, set_step, time_panel
 from pipeline.recording.shapes import shown_pose
 from pipeline.world.cameras import points_of_depth
 
@@ -100,7 +100,7 @@ def show_prediction(stream: rr.RecordingStream, prediction: Prediction) -> None:
         static=True,
     )
     for index in range(len(proposals)):
-        step(stream, TIMELINE, index)
+        set_step(stream, TIMELINE, index)
         pose = proposals.world_from_contact[index]
         tip = pose[:3, 3] + 4.0 * prediction.radius_m * pose[:3, 2]
         stream.log(
@@ -136,7 +136,7 @@ def _eye(prediction: Prediction) -> rrb.EyeControls3D:
     eye = eye + 0.4 * beside + np.array([0.0, 0.0, 0.2 * float(np.linalg.norm(eye - target))])
     x, y, z = (float(value) for value in eye)
     at_x, at_y, at_z = (float(value) for value in target)
-    return looking((x, y, z), (at_x, at_y, at_z))
+    return eye_at((x, y, z), (at_x, at_y, at_z))
 
 
 def _rims(prediction: Prediction) -> list[np.ndarray]:

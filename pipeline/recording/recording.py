@@ -3,7 +3,7 @@
 Entity paths and the timeline are named alike across stages, and a test holds every stage to it:
 
 - ``/world``: what has a place in space, in metres, z up. Things that come and go lie at
-  ``/world/<kind>/<step>/<thing>`` (see `numbered`), a camera and its pictures at
+  ``/world/<kind>/<step>/<thing>`` (see `start_path`), a camera and its pictures at
   ``/world/<camera>/colour``, ``depth``, ``segmentation`` and ``normals``.
 - ``/camera/<name>``: pictures that have no place in a scene that is shown.
 - ``/curves/<quantity>/<curve>``: figures, as curves over the timeline or as bars.
@@ -72,7 +72,7 @@ class Recorded(Protocol):
         """Counts the processor time that recording takes."""
 
 
-class MadeStage(Recorded, Protocol):
+class FinishedStage(Recorded, Protocol):
     """A stage whose artifact is finished: what its recording is drawn from."""
 
     @property
@@ -117,7 +117,7 @@ def recording(stage: Recorded, blueprint: rrb.Blueprint) -> Iterator[rr.Recordin
         try:
             yield stream
         finally:
-            with _disk_full_told(scratch):
+            with _explaining_a_full_disk(scratch):
                 stream.flush()
                 stream.disconnect()
     _warn_if_large(path)
@@ -132,7 +132,7 @@ def _warn_if_large(path: Path) -> None:
 
 
 @contextmanager
-def _disk_full_told(path: Path) -> Iterator[None]:
+def _explaining_a_full_disk(path: Path) -> Iterator[None]:
     """Rerun's writer stops at a full disk and says only that it stopped: say why."""
     try:
         yield
@@ -147,7 +147,7 @@ def _check_room(path: Path) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
 
 
-def looking(
+def eye_at(
     from_m: tuple[float, float, float], at_m: tuple[float, float, float]
 ) -> rrb.EyeControls3D:
     """Where a 3-D view's eye stands and what it looks at, z up."""
@@ -166,12 +166,12 @@ def name_curve(
     stream.log(path, rr.SeriesLines(names=name, colors=colour, widths=1.5), static=True)
 
 
-def step(stream: rr.RecordingStream, timeline: str, index: int) -> None:
+def set_step(stream: rr.RecordingStream, timeline: str, index: int) -> None:
     """Move to step ``index`` of the recording's one timeline."""
     stream.set_time(timeline, sequence=index)
 
 
-def numbered(stream: rr.RecordingStream, path: str, number: int) -> str:
+def start_path(stream: rr.RecordingStream, path: str, number: int) -> str:
     """Path of what is shown at step ``number`` alone; what the step before showed there goes.
 
     Each step has a path of its own, as a clearing and a logging of one path at one time race.

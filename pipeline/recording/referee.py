@@ -16,7 +16,7 @@ from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.transforms import invert
 from pipeline.recording import colours
-from pipeline.recording.recording import looking, numbered, step, time_panel
+from pipeline.recording.recording import eye_at, set_step, start_path, time_panel
 from pipeline.recording.shapes import shown_mesh, shown_pose
 from pipeline.referee.disc import Disc
 from pipeline.referee.seal import GRAVITY_M_S2, Seal
@@ -80,7 +80,7 @@ def blueprint() -> rrb.Blueprint:
             rrb.Spatial3DView(
                 origin="/world",
                 name=VIEW,
-                eye_controls=looking((-0.09, -0.13, 0.11), (0.0, 0.0, -0.01)),
+                eye_controls=eye_at((-0.09, -0.13, 0.11), (0.0, 0.0, -0.01)),
             ),
             rrb.Vertical(
                 rrb.TextDocumentView(origin="/notes/grasp", name="Grasp"),
@@ -105,16 +105,16 @@ def show_seals(
 ) -> None:
     """Log the grasps in their order; ``full_pa`` is the vacuum of a closed fan."""
     for number, one in enumerate(shown):
-        step(stream, TIMELINE, number)
-        path = numbered(stream, "world/objects", number)
+        set_step(stream, TIMELINE, number)
+        path = start_path(stream, "world/objects", number)
         for index, (mesh, pose) in enumerate(one.meshes):
             colour = colours.PALETTE[7 if index else 1]
             stream.log(f"{path}/{index:02d}", shown_mesh(mesh, colour))
             stream.log(f"{path}/{index:02d}", shown_pose(pose))
-        pad = numbered(stream, "world/pad", number)
+        pad = start_path(stream, "world/pad", number)
         if one.seal is not None:
             _show_pad(stream, pad, one.seal, disc, full_pa)
-        arrows = numbered(stream, "world/loads", number)
+        arrows = start_path(stream, "world/loads", number)
         stream.log(
             arrows,
             rr.Arrows3D(

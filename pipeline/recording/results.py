@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from schemas.softgrip.v1.evaluation_pb2 import Comparison, LevelResult
 
 
-def markdown(
+def results_markdown(
     levels: Sequence[LevelResult],
     policies: Sequence[LevelResult],
     comparisons: Sequence[Comparison],

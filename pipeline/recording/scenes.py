@@ -13,15 +13,15 @@ from pipeline.messages.objects import read_objects
 from pipeline.messages.scenes import read_scene, scene_count
 from pipeline.recording import colours
 from pipeline.recording.recording import (
-    MadeStage,
-    looking,
-    numbered,
+    FinishedStage,
+    eye_at,
     recording,
-    step,
+    set_step,
+    start_path,
     time_panel,
 )
 from pipeline.recording.shapes import shown_mesh, shown_pose
-from pipeline.spread import spread
+from pipeline.spread import choose_evenly
 from pipeline.world.cameras import camera_names, points_of_depth
 from pipeline.world.scene import ClutterScene
 from pipeline.world.view import CameraView
@@ -35,12 +35,12 @@ SHOWN_CAMERAS = 3  # more rows are too small to see; their pictures are in the r
 PICTURES = ("colour", "depth", "segmentation", "normals")
 
 
-def draw_scenes(stage: MadeStage, figures: Mapping[str, Any]) -> None:
+def draw_scenes(stage: FinishedStage, figures: Mapping[str, Any]) -> None:
     """Draw the recording: some of the finished scenes, read back."""
     items = read_objects(stage.upstream("objects"))
     meshes = {name: item.mesh for name, (item, _) in items.items()}
     nsvr = {name: item.nsvr for name, (item, _) in items.items()}
-    shown = spread(scene_count(stage.output), stage.config.recording.scenes)
+    shown = choose_evenly(scene_count(stage.output), stage.config.recording.scenes)
     with recording(stage, blueprint(camera_names(stage.config.cameras))) as stream:
         for number, index in enumerate(shown):
             show_scene(stream, number, read_scene(stage.output, index), meshes, nsvr)
@@ -57,7 +57,7 @@ def blueprint(cameras: Sequence[str]) -> rrb.Blueprint:
                     *(f"- $origin/{name}/{kind}" for name in cameras for kind in PICTURES[1:]),
                 ],
                 name="Scene, cameras and coloured cloud",
-                eye_controls=looking((-0.75, -0.75, 0.7), (0.05, 0.05, 0.05)),
+                eye_controls=eye_at((-0.75, -0.75, 0.7), (0.05, 0.05, 0.05)),
             ),
             rrb.Vertical(
                 rrb.Grid(
@@ -92,8 +92,8 @@ def show_scene(
     nsvr: Mapping[str, float],
 ) -> None:
     """One step of the recording."""
-    step(stream, TIMELINE, number)
-    objects = numbered(stream, "world/objects", number)
+    set_step(stream, TIMELINE, number)
+    objects = start_path(stream, "world/objects", number)
     for placed in scene.objects:
         path = f"{objects}/{placed.body_id:02d}"
         mesh = meshes[placed.object_name]

@@ -11,8 +11,8 @@ from pipeline.labelling.balancing import quality_histogram
 from pipeline.messages.samples import read_split
 from pipeline.network.samples import SPLITS, Samples
 from pipeline.recording import colours
-from pipeline.recording.recording import MadeStage, looking, recording, time_panel
-from pipeline.spread import spread
+from pipeline.recording.recording import FinishedStage, eye_at, recording, time_panel
+from pipeline.spread import choose_evenly
 
 TIMELINE = "sample"
 SHEET_COLUMNS = 10  # clouds in a row of the sheet
@@ -20,7 +20,7 @@ SHEET_SPACING = 3.0  # in r_G: clouds are 2.4 wide
 CELL_RADIUS = 0.04  # a cell is drawn as a ball of this size, in r_G
 
 
-def draw_shards(stage: MadeStage, figures: Mapping[str, Any]) -> None:
+def draw_shards(stage: FinishedStage, figures: Mapping[str, Any]) -> None:
     """Draw the recording from the finished shards."""
     by_split = {split: read_split(stage.output, split) for split in SPLITS}
     with recording(stage, blueprint()) as stream:
@@ -35,12 +35,12 @@ def blueprint() -> rrb.Blueprint:
                 rrb.Spatial3DView(
                     origin="/world/sheet",
                     name="Clouds by growing q, units of r_G",
-                    eye_controls=looking((13.5, -36.0, 22.0), (13.5, -14.0, 0.0)),
+                    eye_controls=eye_at((13.5, -36.0, 22.0), (13.5, -14.0, 0.0)),
                 ),
                 rrb.Spatial3DView(
                     origin="/world/cloud",
                     name="One cloud, coloured by height",
-                    eye_controls=looking((1.3, -1.9, 1.5), (0, 0, 0)),
+                    eye_controls=eye_at((1.3, -1.9, 1.5), (0, 0, 0)),
                 ),
                 row_shares=[3, 2],
             ),
@@ -79,7 +79,7 @@ def show_samples(stream: rr.RecordingStream, by_split: dict[str, Samples], wante
 def show_clouds(stream: rr.RecordingStream, samples: Samples, wanted: int) -> None:
     """A sheet of clouds by growing q, and one after the other over the timeline."""
     order = np.argsort(samples.quality, kind="stable")
-    chosen = order[spread(len(order), wanted)]
+    chosen = order[choose_evenly(len(order), wanted)]
     clouds = [samples.cloud[i][samples.cloud_mask[i]].astype(np.float32) for i in chosen]
     counts = [len(cloud) for cloud in clouds]
     number = np.arange(len(chosen))

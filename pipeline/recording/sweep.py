@@ -12,14 +12,14 @@ from pipeline.errors import ArtifactError
 from pipeline.messages.sweep import read_sweep
 from pipeline.network.family import VARIANTS
 from pipeline.recording import colours
-from pipeline.recording.recording import MadeStage, name_curve, recording, step, time_panel
+from pipeline.recording.recording import FinishedStage, name_curve, recording, set_step, time_panel
 from schemas.softgrip.v1.training_pb2 import SweepBudget, SweepNetwork
 
 TIMELINE = "layers"
 _CHOSEN_COLOUR = (60, 200, 90)  # green, as Fig. 1 marks the chosen network
 
 
-def draw_sweep(stage: MadeStage, figures: Mapping[str, Any]) -> None:
+def draw_sweep(stage: FinishedStage, figures: Mapping[str, Any]) -> None:
     """Draw the recording: errors are of the artifact, times of the summary.
 
     Parameters
@@ -87,12 +87,12 @@ def show_sweep(
     for curve in ("error", "time"):
         stream.log(f"curves/{curve}/chosen", dot, static=True)
     for network, time_ms in family:
-        step(stream, TIMELINE, network.layers)
+        set_step(stream, TIMELINE, network.layers)
         for curve, value in (("error", network.test_mae), ("time", time_ms)):
             stream.log(f"curves/{curve}/{channels_name(network)}", rr.Scalars(value))
             if network.chosen:
                 stream.log(f"curves/{curve}/chosen", rr.Scalars(value))
-    text = f"{budget_words(budget)}\n\n{family_table(family)}\n\n{ablation_table(networks)}\n"
+    text = f"{describe_budget(budget)}\n\n{family_table(family)}\n\n{ablation_table(networks)}\n"
     document = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
     stream.log("notes/sweep", document, static=True)
 
@@ -102,7 +102,7 @@ def channels_name(network: SweepNetwork) -> str:
     return "-".join(map(str, network.channels))
 
 
-def budget_words(budget: SweepBudget) -> str:
+def describe_budget(budget: SweepBudget) -> str:
     """What every network was given, in a sentence."""
     return (
         f"{budget.train_samples} training samples, {budget.epochs} epochs, batches of "

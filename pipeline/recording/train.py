@@ -16,11 +16,11 @@ from pipeline.network.resuming import EpochMetrics
 from pipeline.network.samples import Samples
 from pipeline.recording import colours
 from pipeline.recording.recording import (
-    MadeStage,
-    looking,
+    FinishedStage,
+    eye_at,
     name_curve,
     recording,
-    step,
+    set_step,
     time_panel,
 )
 from schemas.softgrip.v1.training_pb2 import Epoch, TrainingResult
@@ -32,7 +32,7 @@ SHEET_SPACING = 3.0  # in r_G: clouds are 2.4 wide
 SCATTER_POINTS = 5000  # more hide each other in the plot
 
 
-def draw_train(stage: MadeStage, figures: Mapping[str, Any]) -> None:
+def draw_train(stage: FinishedStage, figures: Mapping[str, Any]) -> None:
     """Draw the recording: the curve and the figures of the artifact, on the test clouds."""
     test_set = read_split(stage.upstream("shards"), "test")
     with open_artifact(stage.output) as artifact:
@@ -62,7 +62,7 @@ def blueprint() -> rrb.Blueprint:
                 rrb.Spatial3DView(
                     origin="/world/worst",
                     name="Worst test samples: q / q-hat",
-                    eye_controls=looking((7.5, -18.0, 12.0), (7.5, -4.5, 0.0)),
+                    eye_controls=eye_at((7.5, -18.0, 12.0), (7.5, -4.5, 0.0)),
                 ),
             ),
         ),
@@ -83,7 +83,7 @@ def show_training(
         name_curve(stream, f"curves/error/{name}", name.replace("_", " "), colours.PALETTE[colour])
     name_curve(stream, "curves/rate", "learning rate", colours.PALETTE[6])
     for metrics in history:
-        step(stream, TIMELINE, metrics.epoch)
+        set_step(stream, TIMELINE, metrics.epoch)
         stream.log("curves/error/train", rr.Scalars(metrics.train_mae))
         stream.log("curves/error/val", rr.Scalars(metrics.val_mae))
         stream.log("curves/error/mean_predictor", rr.Scalars(figures.mean_predictor_mae))

@@ -28,7 +28,7 @@ _TRIES = 3  # beyond the first; the viewer gives up on a picture after some seco
 
 
 @dataclass(frozen=True)
-class Sight:
+class ViewerState:
     """What a person sees who opens a recording.
 
     Attributes
@@ -47,7 +47,7 @@ class Sight:
     timeline: str
 
 
-def sight_of(recording: Path, step: int | None = None) -> Sight:
+def photograph(recording: Path, step: int | None = None) -> ViewerState:
     """Open ``recording`` in the viewer, off screen, and look once it stands still.
 
     Parameters
@@ -83,7 +83,7 @@ def sight_of(recording: Path, step: int | None = None) -> Sight:
             f"{view.name}: {report}" for view in state.views for report in view.reports
         )
         (shown,) = state.recordings
-        return Sight(window, views, problems, shown.current_timeline or "")
+        return ViewerState(window, views, problems, shown.current_timeline or "")
 
 
 @contextmanager
@@ -201,7 +201,7 @@ def picture(
 ) -> None:
     """Photograph a recording as the viewer shows it."""
     try:
-        sight = sight_of(recording, step)
+        sight = photograph(recording, step)
     except SoftgripError as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(1) from None

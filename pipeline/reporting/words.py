@@ -42,7 +42,7 @@ def mixed_parts(
     ]
 
 
-def words_on_meshes(
+def describe_meshes(
     folder: RunFolder, config: RunConfig, catalogue: CatalogueFacts
 ) -> tuple[str, str, str]:
     """Where the meshes are from, their licence in a line, and what their folder says of it."""

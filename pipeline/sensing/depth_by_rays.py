@@ -17,7 +17,7 @@ from pipeline.world.raycasting import Surfaces
 from pipeline.world.view import CameraView, normal_map
 
 
-def measured(
+def measure_depth(
     camera: PinholeCamera,
     scene: Surfaces,
     opaque: Surfaces | None,

@@ -71,7 +71,7 @@ def new_renderer(name: RendererName, config: ScenesConfig) -> Renderer:
         return RayRenderer(config)
 
 
-def rendered(
+def render_views(
     scene: ClutterScene,
     objects: Mapping[str, CatalogueObject],
     cameras: Sequence[PinholeCamera],

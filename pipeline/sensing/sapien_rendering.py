@@ -94,7 +94,7 @@ class SapienRenderer:
         )
 
 
-def rendered_table(config: ScenesConfig, camera: PinholeCamera) -> CameraView:
+def render_table(config: ScenesConfig, camera: PinholeCamera) -> CameraView:
     """The empty table: the least picture there is, to try a driver with."""
     return SapienRenderer(config).views((), {}, (camera,))[0]
 

@@ -1,1 +1,1 @@
-"""The SAPIEN world: Vulkan driver, table, bodies, their shading and lights."""
+"""The closed loop in SAPIEN: gripper, arm, cameras, suction, and the emptying of a clutter."""

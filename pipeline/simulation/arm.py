@@ -1,9 +1,9 @@
 """The gripper on a KUKA LBR iiwa 14 R820: SAPIEN's articulation, Pinocchio's inverse kinematics.
 
-Straight lines of the gripper become joint targets at every physics step; joints keep their range,
-speed and torque. Gravity is compensated, as the real arm's controller does. Links push the objects
-and the table that they meet; where they would meet each other or the table, targets count as out
-of reach and motions stop.
+At every physics step the commanded gripper pose becomes joint targets. Joints keep their limits of
+angle, speed and torque. Gravity of the arm is compensated, as the real arm's controller does. The
+links push the objects and the table when they touch them. Joint angles at which links would
+collide with each other or with the table count as unreachable, and a motion stops before them.
 """
 
 import tempfile
@@ -31,17 +31,17 @@ _ELBOW_UP = np.array([0.0, 0.5, 0.0, -1.4, 0.0, 1.2, 0.0])
 _SEEDS = 12  # further postures, at random, to start from
 _HEADINGS = 8  # turns of the round pad about its axis that are tried
 _ITERATIONS = 150  # bounds inverse kinematics that does not converge
-_GIVES_RAD = (0.1, 0.3, 0.6)  # of the elbow, where a joint is at its end
+_GIVES_RAD = (0.1, 0.3, 0.6)  # steps of the elbow, where a joint is at its limit
 _BY_ITSELF = [1, 1, 1, 0]  # shapes that share a bit of the third group do not collide
 
 
 class ArmMover:
-    """`pipeline.simulation.floating.Mover`: the arm beside the table."""
+    """A `pipeline.simulation.floating.Mover` that is an arm standing beside the table."""
 
     def __init__(
         self, world: sapien.Scene, hand: HandConfig, arm: ArmConfig, pad_radius_m: float
     ) -> None:
-        self._world = world  # the articulation is the world's: it must outlive this
+        self._world = world  # owns the articulation, so it must live as long
         self._timestep_s = world.timestep
         self._base = np.eye(4)
         self._base[:3, 3] = arm.base_m
@@ -66,14 +66,24 @@ class ArmMover:
         self.reset()
 
     def reset(self) -> None:
-        """Home, at once."""
+        """Put the joints at their home angles at once, at rest."""
         self._q_rad = self._home_rad.copy()
         self._articulation.set_qpos(self._q_rad)
         self._articulation.set_qvel(np.zeros(7))
         self._to_drives(np.zeros(7))
 
     def drive(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> bool:
-        """Joint targets a physics step nearer to the pose; False where the arm cannot follow."""
+        """Set joint targets one physics step closer to the pose.
+
+        Parameters
+        ----------
+        world_from_gripper
+            The commanded pose in WCS, shape (4, 4).
+
+        Returns
+        -------
+        False where no joint angles reach the pose, or the step would collide; the arm then stops.
+        """
         wanted = self._followed(world_from_gripper)
         if wanted is None:
             self._to_drives(np.zeros(7))
@@ -89,22 +99,35 @@ class ArmMover:
         return True
 
     def pose(self) -> Float[np.ndarray, "4 4"]:
-        """world_from_gripper as the joints really are."""
+        """Pose world_from_gripper that the simulated joints really have, shape (4, 4)."""
         placed = self._pad.entity_pose
         return np.asarray(pose_of(placed.p.astype(np.float64), placed.q.astype(np.float64)))
 
     def reachable(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> bool:
-        """Whether joints within their ranges reach the pose, clear of the arm and the table."""
+        """Whether joint angles within their limits reach the pose without a collision."""
         return self.joints_at(world_from_gripper, self._q_rad) is not None
 
     def owns(self, entity: sapien.Entity) -> bool:
-        """Any link."""
+        """Whether the entity is one of the arm's links."""
         return entity.per_scene_id in self._own
 
     def joints_at(
         self, world_from_gripper: Float[np.ndarray, "4 4"], near_rad: Float[np.ndarray, " 7"]
     ) -> Float[np.ndarray, " 7"] | None:
-        """Joint angles for a pose, sought from some angles first, then from elsewhere."""
+        """Find joint angles for a pose of the gripper by inverse kinematics.
+
+        Parameters
+        ----------
+        world_from_gripper
+            The pose in WCS, shape (4, 4).
+        near_rad
+            Joint angles from which the search starts first [rad], shape (7,); then it starts from
+            fixed others.
+
+        Returns
+        -------
+        Joint angles [rad], shape (7,), free of collisions; None where none were found.
+        """
         for seed in (near_rad, *self._seeds):
             found = self._solution(world_from_gripper, seed)
             if found is not None and self._clearance.is_free(found):
@@ -112,7 +135,10 @@ class ArmMover:
         return None
 
     def _most_comfortable(self, arm: ArmConfig) -> Float[np.ndarray, " 7"]:
-        """Joint angles at home farthest from the ends of their ranges; the pad's spin is free."""
+        """Joint angles at the home pose that are farthest from their limits [rad], shape (7,).
+
+        The pad is round, so its heading is free and several headings are tried.
+        """
         found = []
         for heading in np.arange(_HEADINGS) * 2 * np.pi / _HEADINGS:
             x_axis = np.diag([1.0, 1.0, 1.0, 1.0])
@@ -128,7 +154,7 @@ class ArmMover:
         return max(solved, key=lambda q: float((1 - np.abs(q) / LIMITS_RAD).min()))
 
     def joints_rad(self) -> Float[np.ndarray, " 7"]:
-        """Joint angles now."""
+        """Measured joint angles [rad], shape (7,)."""
         return np.asarray(self._articulation.qpos, dtype=np.float64)
 
     def _solution(
@@ -136,6 +162,7 @@ class ArmMover:
         world_from_gripper: Float[np.ndarray, "4 4"],
         seed_rad: Float[np.ndarray, " 7"],
     ) -> Float[np.ndarray, " 7"] | None:
+        """Joint angles for a pose from one starting point [rad]; None if not found within limits."""
         base_from_gripper = invert(self._base) @ world_from_gripper
         found, solved, _ = self._model.compute_inverse_kinematics(
             self._pad_index,
@@ -154,10 +181,12 @@ class ArmMover:
     def _followed(
         self, world_from_gripper: Float[np.ndarray, "4 4"]
     ) -> Float[np.ndarray, " 7"] | None:
-        """Joint angles for a pose near to those now; where one is at its end, the elbow gives way.
+        """Joint angles for a pose, near the present ones [rad]; None where none are found.
 
-        Six numbers place the gripper: seven joints can move without it, by their Jacobian's null
-        space, and towards the middle of the range of the joint that is nearest to its end.
+        The pose takes six of the arm's seven degrees of freedom. The seventh, the null space of the
+        Jacobian, moves the joints without moving the gripper. Where the direct search fails, the
+        joint that is nearest to its limit is moved towards its middle in that null space, and the
+        search starts again from there.
         """
         found = self._solution(world_from_gripper, self._q_rad)
         if found is not None:
@@ -172,6 +201,7 @@ class ArmMover:
         return next((q for q in solved if q is not None and self._clearance.is_free(q)), None)
 
     def _to_drives(self, speed_rad_s: Float[np.ndarray, " 7"]) -> None:
+        """Send the joint targets and their speeds [rad/s] to SAPIEN's drives."""
         for joint, q, rate in zip(self._joints, self._q_rad, speed_rad_s, strict=True):
             joint.set_drive_target(q)
             joint.set_drive_velocity_target(rate)
@@ -180,6 +210,7 @@ class ArmMover:
 def _loaded(
     world: sapien.Scene, hand: HandConfig, hand_mass_kg: float
 ) -> sapien.physx.PhysxArticulation:
+    """Load the arm with its gripper into the world; its foot is fixed."""
     loader = world.create_urdf_loader()
     loader.fix_root_link = True
     with tempfile.TemporaryDirectory() as folder:

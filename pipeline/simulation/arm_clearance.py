@@ -1,7 +1,8 @@
-"""Whether the arm, with its hand, would run into itself or the table: FCL on cylinders and balls.
+"""Whether arm and hand would collide with themselves or the table: FCL on cylinders and spheres.
 
-Links next to each other, or with one ball between them, share a joint: their shapes always overlap
-there, and the joint's range keeps the rest apart. The hand is one body with the last link.
+Links that are neighbours in the chain, or have one sphere between them, overlap at their joint by
+design and are not checked against each other; the joint's limits keep them apart. The hand is
+rigidly fixed to the last link.
 """
 
 from collections.abc import Iterator
@@ -25,7 +26,7 @@ _OFF_THE_TABLE = ("base", "link1", "pad")  # stands on it, or turns upright in p
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """A shape, the link it is fixed to, and where; ``place`` is along the chain."""
+    """A collision shape, the link it is fixed to, its pose there, and its position in the chain."""
 
     name: str
     place: int
@@ -35,40 +36,51 @@ class _Part:
 
 
 class ArmClearance:
-    """The arm's shapes, each grown so that ``margin_m`` is kept between two, and to the table."""
+    """Collision shapes of the arm, each enlarged by half of the clearance that is asked for."""
 
     def __init__(
         self, hand: HandConfig, pad_radius_m: float, base_z_m: float, margin_m: float
     ) -> None:
-        """Links, hand and camera as shapes, at no posture yet.
+        """Build the shapes of links, hand and camera.
 
         Parameters
         ----------
         hand
-            Measures of stem and camera.
+            Sizes of stem and camera.
         pad_radius_m
             r_G [m].
         base_z_m
-            Height of the arm's foot over the table [m].
+            Height of the arm's foot above the table [m].
         margin_m
-            Distance that counts as too near [m].
+            Two shapes that are closer than this count as colliding [m].
         """
         self._parts = _parts(hand, pad_radius_m, margin_m / 2)
         self._pairs = [
             (a, b) for a, b in combinations(self._parts, 2) if abs(a.place - b.place) > _NEAR
         ]
         self._above = [part for part in self._parts if part.name not in _OFF_THE_TABLE]
-        # A half space: beside the table is nothing to reach for either.
+        # A half space, not a box: there is nothing to reach beside the table.
         ground = fcl.Halfspace(np.array([0.0, 0.0, 1.0]), margin_m / 2 - base_z_m)
         self._table = fcl.CollisionObject(ground, fcl.Transform())
         self._request = fcl.CollisionRequest()
 
     def is_free(self, q_rad: Float[np.ndarray, " 7"]) -> bool:
-        """Whether nothing meets."""
+        """Whether nothing collides at these joint angles [rad]."""
         return next(self.meetings(q_rad), None) is None
 
     def meetings(self, q_rad: Float[np.ndarray, " 7"]) -> Iterator[tuple[str, str]]:
-        """Names of what would meet at these joint angles, pair by pair."""
+        """Find everything that collides at some joint angles.
+
+        Parameters
+        ----------
+        q_rad
+            Joint angles [rad], shape (7,).
+
+        Yields
+        ------
+        tuple[str, str]
+            Names of two colliding parts, or of a part and the table.
+        """
         base_from_link = link_poses(q_rad)
         for part in self._parts:
             pose = base_from_link[part.link] @ part.link_from_shape
@@ -85,7 +97,7 @@ class ArmClearance:
 
 
 def _parts(hand: HandConfig, pad_radius_m: float, grown_m: float) -> list[_Part]:
-    """Links, stem, the soft pad as it is when free, and a ball around the camera."""
+    """Shapes of links and stem, the pad in its free shape, and a sphere around the camera."""
     link_from_flange = _along_z(FLANGE_M)
     link_from_gripper = link_from_flange @ flange_from_gripper(hand)
     pad = LinkShape("pad", pad_radius_m, 0.0, hand.stem_begins_m)

@@ -1,4 +1,4 @@
-"""The gripper without an arm: a kinematic stem that is wherever it is told to be."""
+"""The gripper without an arm: a kinematic stem that follows every commanded pose exactly."""
 
 from typing import Protocol
 
@@ -9,41 +9,53 @@ from jaxtyping import Float
 from pipeline.config.evaluation import HandConfig
 from pipeline.geometry.compiled_poses import quaternion_of
 
-"""Where the pad waits: upright above the table's middle."""
 # SAPIEN's capsules lie along x.
 _Z_FROM_X = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 
 
 class Mover(Protocol):
-    """What holds the gripper in a SAPIEN world."""
+    """The body that carries the gripper in a SAPIEN world: a stem on its own, or an arm."""
 
     def reset(self) -> None:
-        """Home, at once."""
+        """Put the gripper at its home pose at once, without moving through the space between."""
         ...
 
     def drive(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> bool:
-        """Where to be at the end of the next physics step; False where it cannot follow."""
+        """Command the pose that the gripper shall have at the end of the next physics step.
+
+        Parameters
+        ----------
+        world_from_gripper
+            The commanded pose in WCS, shape (4, 4).
+
+        Returns
+        -------
+        False where the mover cannot follow; it then stops.
+        """
         ...
 
     def pose(self) -> Float[np.ndarray, "4 4"]:
-        """world_from_gripper as it is."""
+        """Measured pose world_from_gripper, shape (4, 4)."""
         ...
 
     def reachable(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> bool:
-        """Whether it can be there."""
+        """Whether the gripper can take this pose."""
         ...
 
     def owns(self, entity: sapien.Entity) -> bool:
-        """Whether an entity is part of it."""
+        """Whether a SAPIEN entity is part of the mover."""
         ...
 
     def joints_rad(self) -> Float[np.ndarray, " joints"]:
-        """Joint angles now; none where nothing but the gripper moves."""
+        """Joint angles [rad]; empty where there is no arm."""
         ...
 
 
 class FloatingMover:
-    """`Mover`: a capsule along the axis, above the soft pad, which is out of collision."""
+    """A `Mover` that is only a stem: a capsule on the gripper's axis above the soft pad.
+
+    The pad itself has no collision shape.
+    """
 
     def __init__(self, world: sapien.Scene, hand: HandConfig, table_side_m: float) -> None:
         self._half_m = table_side_m / 2
@@ -66,37 +78,37 @@ class FloatingMover:
         self.reset()
 
     def reset(self) -> None:
-        """Home, at once."""
+        """Put the gripper upright above the middle of the table, at once."""
         self._pose = np.eye(4)
         self._pose[2, 3] = self._home_m
         self._entity.pose = self._stem_pose()
 
     def drive(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> bool:
-        """There by the end of the next physics step."""
+        """Move the stem to the pose by the end of the next physics step; it can always follow."""
         self._pose = world_from_gripper
         self._rigid.kinematic_target = self._stem_pose()
         return True
 
     def pose(self) -> Float[np.ndarray, "4 4"]:
-        """Exactly where it was told to be."""
+        """The pose last commanded, world_from_gripper: the stem follows exactly."""
         return self._pose.copy()
 
     def reachable(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> bool:
-        """Above the table, pointing down."""
+        """Whether the pose is above the table with the pad facing down."""
         place = world_from_gripper[:3, 3]
         above = bool(np.abs(place[:2]).max() <= self._half_m and place[2] >= 0.0)
         return above and bool(world_from_gripper[2, 2] > 0.0)
 
     def owns(self, entity: sapien.Entity) -> bool:
-        """The stem alone."""
+        """Whether the entity is the stem."""
         return bool(entity == self._entity)
 
     def joints_rad(self) -> Float[np.ndarray, " joints"]:
-        """None."""
+        """An empty array: there are no joints."""
         return np.empty(0)
 
     def _stem_pose(self) -> sapien.Pose:
-        """The capsule's centre; a capsule lies along its x."""
+        """Pose of the capsule's centre in WCS; the long axis of a SAPIEN capsule is its x axis."""
         above = self._begins_m + self._radius_m + self._half_length_m
         centre = self._pose[:3, 3] + above * self._pose[:3, 2]
         return sapien.Pose(centre, quaternion_of(self._pose[:3, :3] @ _Z_FROM_X))

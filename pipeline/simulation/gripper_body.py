@@ -1,7 +1,8 @@
-"""The suction gripper in SAPIEN: moves a control step at a time, feels, seals, carries, loses.
+"""The suction gripper in SAPIEN: it moves, measures forces, seals, carries and loses objects.
 
-The rigid stem pushes what it meets; the soft pad below it is out of collision, for it drapes: it
-stops where it first touches the true surfaces, at the pose really reached.
+The rigid stem collides with bodies and pushes them. The soft pad below it has no collision shape,
+because a real pad would deform: the gripper stops where the pad, at the pose really reached, first
+touches the true surfaces.
 """
 
 from collections.abc import Mapping
@@ -20,7 +21,7 @@ from pipeline.labelling.heights import pad_heights
 from pipeline.labelling.poses import label_poses
 from pipeline.physics.engine import Body
 from pipeline.simulation.floating import Mover
-from pipeline.simulation.judges import judge_of
+from pipeline.simulation.judges import build_judge
 from pipeline.simulation.suction_joint import SuctionJoint
 from pipeline.world.posed_bodies import PosedBodies, PosedScene
 
@@ -31,14 +32,22 @@ _LEVER_M = 0.2  # a turn counts as the way of a point this far from the axis
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """Things as they stood at the end of a control step.
+    """State of the simulation at the end of a control step.
 
     Attributes
     ----------
+    time_s
+        Simulated time since the attempt began [s].
+    world_from_gripper
+        Pose of the gripper, shape (4, 4).
+    world_from_object
+        Pose of each body by body id, shape (4, 4).
     wrench
-        At the base, in GCS.
+        Force [N] and moment [N m] at the flange, in the axes of GCS, shape (6,).
+    state
+        Name of the policy's state.
     joints_rad
-        Of the arm, empty where there is none.
+        Joint angles of the arm [rad]; empty where there is none.
     """
 
     time_s: float
@@ -50,7 +59,7 @@ class Sample:
 
 
 class SuctionGripper:
-    """`pipeline.control.robot.Robot` in SAPIEN, on whatever moves it."""
+    """The simulated gripper as `pipeline.control.robot.Robot`, carried by a `Mover`."""
 
     def __init__(
         self,
@@ -61,15 +70,15 @@ class SuctionGripper:
         config: RunConfig,
         mover: Mover,
     ) -> None:
-        """A gripper at home, holding nothing.
+        """Place the gripper at home, holding nothing.
 
         Parameters
         ----------
         world
             PhysX scene in which it moves.
         bodies
-            Bodies of the world by body id; whoever takes one out of the world takes it out here
-            too.
+            Bodies of the world by body id. Code that removes a body from the world must also remove
+            it from this mapping.
         objects
             Catalogue entry of each body.
         pad
@@ -77,7 +86,7 @@ class SuctionGripper:
         config
             Sections gripper, scenes and evaluate.
         mover
-            What moves it: nothing, or an arm.
+            The stem or the arm that carries the gripper.
         """
         self._world = world
         self._bodies = bodies
@@ -85,7 +94,7 @@ class SuctionGripper:
         self._pad = pad
         self._config = config
         self._mover = mover
-        self._judge = judge_of(config, pad)
+        self._judge = build_judge(config, pad)
         self._surfaces = PosedBodies(
             {i: item.mesh for i, item in objects.items()}, config.scenes.table_side_m
         )
@@ -96,7 +105,7 @@ class SuctionGripper:
         self.begin()
 
     def begin(self) -> None:
-        """Home, and forget the last attempt."""
+        """Release the object, go home at once, and clear the record of the last attempt."""
         self.vacuum(on=False)
         self._mover.reset()
         self._goal = self._mover.pose()
@@ -111,19 +120,31 @@ class SuctionGripper:
         self._sample(np.zeros(6))
 
     def enter(self, state: State) -> None:
-        """Name what is being done, for the record."""
+        """Store the policy's state for the recorded samples."""
         self._state = state
 
     def pose(self) -> Float[np.ndarray, "4 4"]:
-        """world_from_gripper now."""
+        """Measured pose world_from_gripper, shape (4, 4)."""
         return self._mover.pose()
 
     def reachable(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> bool:
-        """Whether what moves the gripper can be there."""
+        """Whether the mover can bring the gripper to this pose."""
         return self._mover.reachable(world_from_gripper)
 
     def step(self, world_from_gripper: Float[np.ndarray, "4 4"], speed_m_s: float) -> Reading:
-        """One control period straight towards a pose; the pad stops where it touches."""
+        """Move straight towards a pose for one control period; stop where the pad touches.
+
+        Parameters
+        ----------
+        world_from_gripper
+            The pose to reach, shape (4, 4).
+        speed_m_s
+            Greatest speed [m/s].
+
+        Returns
+        -------
+        Pose, wrench and the events of this period.
+        """
         target, touches = self._stopped_by_touch(world_from_gripper, speed_m_s)
         loads, peak_n = [], 0.0
         for _ in range(self._steps):
@@ -137,7 +158,16 @@ class SuctionGripper:
         return self._reading(np.mean(loads, axis=0), peak_n, self._at(world_from_gripper), touched)
 
     def vacuum(self, on: bool) -> None:
-        """Off lets go. On seals what is under the pad, on the true surfaces, as the judge finds."""
+        """Switch the vacuum.
+
+        Off releases the object. On asks the judge (`evaluate.judge`) which body under the pad is
+        sealed, on the true surfaces, and attaches that body if its seal can hold anything.
+
+        Parameters
+        ----------
+        on
+            Whether the vacuum is on.
+        """
         if not on:
             if self._joint is not None:
                 self._joint.open()
@@ -145,7 +175,7 @@ class SuctionGripper:
             return
         self.reached_pose = pose = self.pose()
         self.target, self.reached_quality, self.seal_pressure = 0, 0.0, 0.0
-        found = self._judge.sealed(pose, self.surfaces())
+        found = self._judge.find_seal(pose, self.surfaces())
         if found is None or found[1].pressure <= 0.0:
             return
         self.target, bearing = found
@@ -153,10 +183,13 @@ class SuctionGripper:
         self.reached_quality = self._quality_at(pose, self.target)
         if bearing.closes:
             body, item = self._bodies[self.target], self._objects[self.target]
-            self._joint = SuctionJoint.closed(body, item, bearing, pose)
+            self._joint = SuctionJoint.close(body, item, bearing, pose)
 
     def shake(self) -> Reading:
-        """Side to side, then still; the wrench is the mean while still."""
+        """Shake the object from side to side, then hold still.
+
+        The wrench returned is the mean over the last control period.
+        """
         lift = self._config.evaluate.lift
         centre = self._goal.copy()
         for number in range(1, round(lift.shake_s / self._world.timestep) + 1):
@@ -174,11 +207,17 @@ class SuctionGripper:
         return self._reading(np.mean(loads[-self._steps :], axis=0), 0.0, True, touched=False)
 
     def lifted_m(self) -> float:
-        """How far the held object is up; 0 where none is held."""
+        """Height of the held object above where it was sealed [m]; 0 where none is held."""
         return self._joint.risen_m() if self._joint is not None else 0.0
 
     def settle(self, longest_s: float) -> None:
-        """Let what was dropped or pushed come to rest, the gripper being home."""
+        """Run physics, with the gripper at home, until dropped or pushed bodies are at rest.
+
+        Parameters
+        ----------
+        longest_s
+            Simulated time after which it ends in any case [s].
+        """
         scenes = self._config.scenes
         for number in range(round(longest_s / self._world.timestep)):
             self._world.step()
@@ -190,7 +229,7 @@ class SuctionGripper:
                 return
 
     def surfaces(self) -> PosedScene:
-        """The true surfaces where they are now."""
+        """The true surfaces of the bodies at their present poses."""
         return self._surfaces.at({i: b.world_from_object for i, b in self._bodies.items()})
 
     def _quality_at(self, pose: Float[np.ndarray, "4 4"], target: int) -> float:
@@ -203,7 +242,7 @@ class SuctionGripper:
     def _stopped_by_touch(
         self, target: Float[np.ndarray, "4 4"], speed_m_s: float
     ) -> tuple[Float[np.ndarray, "4 4"], bool]:
-        """The target, or the place on the way there where the pad touches first in this period."""
+        """The target and False; or where the pad first touches within this period, and True."""
         goal = self._goal
         way = target[:3, 3] - goal[:3, 3]
         down_m = -float(way @ goal[:3, 2])
@@ -219,7 +258,7 @@ class SuctionGripper:
         return stop, True
 
     def _advance(self, target: Float[np.ndarray, "4 4"], speed_m_s: float) -> None:
-        """Move the goal one physics step: faster, slower and round within the bounds."""
+        """Move the commanded pose by one physics step, within speed and acceleration."""
         way = target[:3, 3] - self._goal[:3, 3]
         turn = turn_between(self._goal, target)
         left = max(float(np.linalg.norm(way)), _LEVER_M * float(np.linalg.norm(turn)))
@@ -235,7 +274,7 @@ class SuctionGripper:
         self._goal[:3, 3] += share * way
 
     def _physics_step(self) -> tuple[Float[np.ndarray, " 6"], float]:
-        """One step of the world; the load on the pad in GCS, and the push on rigid parts [N]."""
+        """Step the world once; load on the pad in GCS, and force on the rigid parts [N]."""
         self._follows &= self._mover.drive(self._goal)
         load = np.zeros(6)
         if self._joint is not None:
@@ -255,6 +294,7 @@ class SuctionGripper:
         return load, float(np.linalg.norm(push[:3]))
 
     def _convey(self) -> None:
+        """Give every body that is not held the conveyor's speed."""
         if self.conveyor_m_s == 0.0:
             return
         held = self._joint.body if self._joint is not None else None
@@ -264,7 +304,7 @@ class SuctionGripper:
                 body.rigid.set_linear_velocity([self.conveyor_m_s, 0.0, falling])
 
     def _push_on_rigid_parts(self) -> Float[np.ndarray, " 6"] | None:
-        """Contact force, and its moment about the pad's centre, in WCS; None without contact."""
+        """Contact force [N], moment about the pad's centre [N m], in WCS; None without."""
         total, centre = None, self.pose()[:3, 3]
         for contact in self._world.get_contacts():
             first, second = (self._mover.owns(body.entity) for body in contact.bodies)
@@ -281,6 +321,7 @@ class SuctionGripper:
     def _reading(
         self, load: Float[np.ndarray, " 6"], peak_n: float, arrived: bool, touched: bool
     ) -> Reading:
+        """Record a sample and return what the robot reports for this period."""
         if touched:
             load = load + np.array([0.0, 0.0, self._config.evaluate.hand.touch_n, 0.0, 0.0, 0.0])
         wrench = self._at_base(load)
@@ -289,12 +330,12 @@ class SuctionGripper:
         return Reading(self.pose(), wrench, peak_n, arrived, followed)
 
     def _at_base(self, load: Float[np.ndarray, " 6"]) -> Float[np.ndarray, " 6"]:
-        """A load at the pad's centre as the flange feels it."""
+        """A load at the pad's centre, moved to the flange; axes stay those of GCS."""
         pad_from_base = np.array([0.0, 0.0, -self._config.evaluate.hand.length_m])
         return np.concatenate([load[:3], load[3:] + np.cross(pad_from_base, load[:3])])
 
     def _at(self, target: Float[np.ndarray, "4 4"]) -> bool:
-        """Whether it was told to be there and is."""
+        """Whether the target was commanded and the gripper has arrived there."""
         lag = float(np.linalg.norm(self._goal[:3, 3] - self.pose()[:3, 3]))
         if lag > _LAG_M:
             return False
@@ -303,11 +344,12 @@ class SuctionGripper:
         return way <= _ARRIVED_M and turn <= _ARRIVED_RAD
 
     def _sample(self, wrench: Float[np.ndarray, " 6"]) -> None:
-        """Add things as they stand to the trajectory."""
+        """Append the present state to the recorded samples."""
         poses = {i: body.world_from_object for i, body in self._bodies.items()}
         joints = self._mover.joints_rad()
         state = str(self._state)
         self.samples.append(Sample(self.time_s, self.pose(), poses, wrench, state, joints))
 
     def _reach_m(self) -> float:
+        """Height above the contact at which rays start [m]."""
         return self._config.grasps.clearance_m

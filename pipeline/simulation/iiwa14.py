@@ -17,14 +17,14 @@ _FOOT_MASS_KG = 5.0  # it is fixed to the ground: any mass serves
 
 
 def stem_shape(hand: HandConfig) -> LinkShape:
-    """The stem, along the flange's z to where the soft pad begins."""
+    """The stem as a shape along the flange's z axis, from the flange to the soft pad."""
     return LinkShape("stem", hand.stem_radius_m, 0.0, hand.length_m - hand.stem_begins_m)
 
 
 def flange_from_gripper(hand: HandConfig) -> Float[np.ndarray, "4 4"]:
-    """GCS on the flange: its z points back from the pad to the flange.
+    """Pose of GCS in the flange's frame; its z axis points from the pad back to the flange.
 
-    Its x, where the camera is, points away from the forearm where the last axis is at 0.
+    The camera is on the x axis, which points away from the forearm where the last joint is at 0.
     """
     pose = np.diag([-1.0, 1.0, -1.0, 1.0])
     pose[2, 3] = hand.length_m
@@ -32,7 +32,19 @@ def flange_from_gripper(hand: HandConfig) -> Float[np.ndarray, "4 4"]:
 
 
 def urdf(hand: HandConfig, hand_mass_kg: float) -> str:
-    """The arm with stem and pad, as URDF text."""
+    """Describe the arm with stem and pad as a URDF.
+
+    Parameters
+    ----------
+    hand
+        Sizes of the stem.
+    hand_mass_kg
+        Mass of the hand [kg].
+
+    Returns
+    -------
+    The URDF as text.
+    """
     robot = Xml.Element("robot", name="iiwa14")
     _link(robot, LINKS[0], _FOOT_MASS_KG)
     parent, d_m, alpha_rad = LINKS[0].link, 0.0, 0.0
@@ -58,7 +70,7 @@ def urdf(hand: HandConfig, hand_mass_kg: float) -> str:
 
 
 def _link(robot: Xml.Element, shape: LinkShape, mass_kg: float) -> None:
-    """A link of one shape, with its inertia."""
+    """Add a link of one shape, with its mass and inertia."""
     link = Xml.SubElement(robot, "link", name=shape.link)
     radius_m, length_m = shape.radius_m, shape.length_m
     middle = f"0 0 {shape.middle_m!r}"

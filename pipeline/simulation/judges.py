@@ -1,7 +1,7 @@
-"""What seals under the vacuum, and what the seal bears: by the referee, or as the label has it.
+"""Which body the vacuum holds, and the load its seal bears: by the referee or by the label.
 
-A judge is a name of `evaluate.judge`, and an object that finds, of the bodies under the pad, the
-one that is held best. Whether it hangs is then asked of what it found, load by load.
+`evaluate.judge` names the judge. It looks at all bodies under the pad and returns the one that is
+held best, with an object that is then asked, load by load, whether the seal still holds.
 """
 
 from dataclasses import dataclass
@@ -15,55 +15,77 @@ from pipeline.gripper.pad import Pad
 from pipeline.labelling.heights import pad_heights
 from pipeline.referee.seal import Seal, referee_of, seal
 from pipeline.referee.surface import surface_of, surface_under
-from pipeline.simulation.suction import holding
+from pipeline.simulation.suction import seal_limits
 from pipeline.world.posed_bodies import PosedScene
 
 
 class Bearing(Protocol):
-    """What a seal can bear."""
+    """The loads that a seal bears."""
 
     @property
     def pressure(self) -> float:
-        """How good the seal is, in [0, 1]; 0 is none."""
+        """Quality of the seal in [0, 1]; 0 means that there is no seal."""
 
     @property
     def closes(self) -> bool:
-        """Whether anything hangs on it at all."""
+        """Whether the seal can hold anything, so that a joint is made."""
 
     def bears(self, load: Float[np.ndarray, " 6"]) -> bool:
-        """Whether it holds a load that the object exerts on the pad, in GCS [N, N m]."""
+        """Whether the seal holds a load.
+
+        Parameters
+        ----------
+        load
+            Force [N] and moment [N m] that the object exerts on the pad, in GCS, shape (6,).
+
+        Returns
+        -------
+        False where the seal breaks.
+        """
 
 
 class Judge(Protocol):
-    """Finds what seals."""
+    """Decides which body under the pad the vacuum holds."""
 
-    def sealed(
+    def find_seal(
         self, world_from_gripper: Float[np.ndarray, "4 4"], surfaces: PosedScene
     ) -> tuple[int, Bearing] | None:
-        """The body held best and what bears it; None where the pad meets no body."""
+        """Find the body under the pad that is held best.
+
+        Parameters
+        ----------
+        world_from_gripper
+            Pose of the gripper, shape (4, 4).
+        surfaces
+            True surfaces of all bodies.
+
+        Returns
+        -------
+        Body id and what its seal bears; None where no body is under the pad.
+        """
 
 
-def judge_of(config: RunConfig, pad: Pad) -> Judge:
-    """What `evaluate.judge` names."""
+def build_judge(config: RunConfig, pad: Pad) -> Judge:
+    """The judge that `evaluate.judge` names."""
     return RefereeJudge(config) if config.evaluate.judge == "referee" else LabelJudge(config, pad)
 
 
 @dataclass(frozen=True, eq=False)
 class LabelJudge:
-    """p of Eq. (2) from the draped pad, limits of Eq. (7)-(11) at a named vacuum."""
+    """Judges as the label does: p of Eq. (2) of the draped pad, limits of Eq. (7)-(11)."""
 
     config: RunConfig
     pad: Pad
 
-    def sealed(
+    def find_seal(
         self, world_from_gripper: Float[np.ndarray, "4 4"], surfaces: PosedScene
     ) -> tuple[int, Bearing] | None:
-        """By the greatest p."""
+        """See `Judge.find_seal`; the body with the greatest p is held best."""
         reach_m = self.config.grasps.clearance_m
         heights, below = pad_heights(world_from_gripper[None], surfaces, self.pad, reach_m)
         gripper, suction = self.config.gripper, self.config.evaluate.suction
         found = [
-            (int(body), holding(self.pad, heights[0], below[0] == body, gripper, suction))
+            (int(body), seal_limits(self.pad, heights[0], below[0] == body, gripper, suction))
             for body in np.unique(below[below > 0])
         ]
         return max(found, key=lambda one: one[1].pressure) if found else None
@@ -71,31 +93,39 @@ class LabelJudge:
 
 @dataclass(frozen=True, eq=False)
 class RefereeBearing:
-    """A seal of the referee's. pressure : its pull over a closed fan's on the whole pad."""
+    """The loads that the referee's seal bears.
+
+    Attributes
+    ----------
+    seal
+        The seal that the referee computed.
+    pressure
+        Pull of the seal over the pull of the closed fan on the whole pad, in [0, 1].
+    """
 
     seal: Seal
     pressure: float
 
     @property
     def closes(self) -> bool:
-        """Where air is drawn at all, something may hang; loads decide."""
+        """Whether the seal pulls at all; each load then decides whether it holds."""
         return self.seal.pull_n > 0.0
 
     def bears(self, load: Float[np.ndarray, " 6"]) -> bool:
-        """By contact pressure and friction against the vacuum's pull."""
+        """See `Bearing.bears`; contact pressure and friction must balance load and pull."""
         return self.seal.hold.bears(load)
 
 
 @dataclass(frozen=True, eq=False)
 class RefereeJudge:
-    """The soft pad pressed, the leak against the fan: `pipeline.referee`."""
+    """Judges by `pipeline.referee`: a soft pad pressed on, and a fan against the leak."""
 
     config: RunConfig
 
-    def sealed(
+    def find_seal(
         self, world_from_gripper: Float[np.ndarray, "4 4"], surfaces: PosedScene
     ) -> tuple[int, Bearing] | None:
-        """By the strongest pull."""
+        """See `Judge.find_seal`; the body with the strongest pull is held best."""
         pad = referee_of(self.config.referee, self.config.gripper.pad.radius_m)
         under, below = surface_under(
             pad.disc, world_from_gripper, surfaces, 0, self.config.grasps.clearance_m

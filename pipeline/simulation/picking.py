@@ -1,4 +1,4 @@
-"""Emptying one clutter: attempt after attempt in one SAPIEN world, judged by physics."""
+"""Emptying one clutter: one attempt after another in one SAPIEN world, each judged by physics."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,13 +21,35 @@ from pipeline.simulation.floating import FloatingMover, Mover
 from pipeline.simulation.gripper_body import Sample, SuctionGripper
 from pipeline.world.scene import ClutterScene
 
-_COLOUR = (0.5, 0.5, 0.5)  # physics has no eyes
+_COLOUR = (0.5, 0.5, 0.5)  # no picture is rendered in this world
 _GONE_M = -0.05  # an object whose centre is lower than this has left the table
 
 
 @dataclass(frozen=True, eq=False)
-class Made:
-    """One attempt as it went: what was decided, what was reached, and how things moved."""
+class JudgedAttempt:
+    """One attempt: what the policy decided, and what the simulation then measured.
+
+    Attributes
+    ----------
+    decision
+        The policy's decision, with its candidates and pictures.
+    cause
+        Why the attempt ended, corrected by what physics shows; `Cause.LIFTED` is a success.
+    target
+        Name of the object under the pad; empty where the vacuum met none.
+    reached_quality
+        q of Algorithm 1 on the true surfaces at the pose reached.
+    seal_pressure
+        Quality of the seal as the judge found it, in [0, 1].
+    lifted_height_m
+        Height of the object above where it was sealed, at the end [m].
+    duration_s
+        Simulated time [s].
+    reached_pose
+        world_from_gripper when the vacuum was switched on, shape (4, 4).
+    samples
+        State at the end of each control step.
+    """
 
     decision: Decision
     cause: Cause
@@ -40,12 +62,26 @@ class Made:
     samples: list[Sample]
 
 
-def strategy_of(name: PolicyName, predict: Predict, config: RunConfig) -> Strategy:
-    """The policies that are compared.
+def build_strategy(name: PolicyName, predict: Predict, config: RunConfig) -> Strategy:
+    """Build one of the policies that are compared.
 
-    closed-loop : several views, corrections, and the wrench heeded. uncorrected : the same without
-    corrections. open-loop : the pose that the network prefers on the first picture, executed.
-    geometric : the flattest patch at the highest point of the first picture, executed.
+    - closed-loop: takes several views, corrects its aim on the way, and reacts to the wrench.
+    - uncorrected: the same without corrections and without reacting to the wrench.
+    - open-loop: executes the pose that the network rates best on the first picture.
+    - geometric: executes the flattest place at the highest point of the first picture.
+
+    Parameters
+    ----------
+    name
+        Name of the policy.
+    predict
+        Network that rates grasps; the geometric policy does not use it.
+    config
+        The run.
+
+    Returns
+    -------
+    The policy.
     """
     network = NetworkRanking(
         predict,
@@ -61,8 +97,8 @@ def strategy_of(name: PolicyName, predict: Predict, config: RunConfig) -> Strate
     return Strategy(name, network, several_views=views, corrects=closed, feels=closed)
 
 
-def mover_of(world: sapien.Scene, config: RunConfig) -> Mover:
-    """What `evaluate.robot` names."""
+def build_mover(world: sapien.Scene, config: RunConfig) -> Mover:
+    """The stem or the arm that `evaluate.robot` names, added to the world."""
     if config.evaluate.robot == "iiwa14":
         pad_radius_m = config.gripper.pad.radius_m
         return ArmMover(world, config.evaluate.hand, config.evaluate.arm, pad_radius_m)
@@ -70,7 +106,7 @@ def mover_of(world: sapien.Scene, config: RunConfig) -> Mover:
 
 
 class Clutter:
-    """One clutter in a world of its own, with a gripper over it."""
+    """One clutter in a SAPIEN world of its own, with a gripper and cameras."""
 
     def __init__(
         self,
@@ -94,14 +130,28 @@ class Clutter:
             )
             for p in scene.objects
         }
-        mover = mover_of(self.world, config)
+        mover = build_mover(self.world, config)
         self.gripper = SuctionGripper(
             self.world, self.bodies, self.items, build_pad(config.gripper.pad), config, mover
         )
         self.eyes = SimulatedEyes(self.bodies, self.items, self.gripper.pose, config, rng)
 
-    def attempted(self, strategy: Strategy, avoid_m: list[Float[np.ndarray, " 3"]]) -> Made:
-        """One attempt; what was lifted or has left the table is taken out of the world."""
+    def make_attempt(
+        self, strategy: Strategy, avoid_m: list[Float[np.ndarray, " 3"]]
+    ) -> JudgedAttempt:
+        """Make one attempt, judge it, and remove what was lifted or fell off the table.
+
+        Parameters
+        ----------
+        strategy
+            The policy.
+        avoid_m
+            Contacts that failed before, in WCS [m], each of shape (3,).
+
+        Returns
+        -------
+        The attempt and how it ended.
+        """
         self.gripper.begin()
         decision = Attempt(
             self.eyes,
@@ -112,7 +162,7 @@ class Clutter:
             self._rng,
             avoid_m,
         ).run()
-        made = self._judged(decision)
+        made = self._judge(decision)
         lifted = {self.gripper.target} if made.cause is Cause.LIFTED else set()
         self.gripper.begin()
         for body_id in lifted:
@@ -122,8 +172,8 @@ class Clutter:
             self.world.remove_entity(self.bodies.pop(body_id).entity)
         return made
 
-    def _judged(self, decision: Decision) -> Made:
-        """Physics has the last word on what the policy believes."""
+    def _judge(self, decision: Decision) -> JudgedAttempt:
+        """Correct the policy's own verdict by what physics shows, such as a low lift."""
         gripper, cause = self.gripper, decision.cause
         height = gripper.lifted_m()
         if cause is Cause.LIFTED and height < self._config.evaluate.lift.height_m:
@@ -132,10 +182,10 @@ class Clutter:
             cause is Cause.NO_SEAL
             and gripper.seal_pressure >= self._config.evaluate.suction.seal_min
         ):
-            cause = Cause.LOST_IN_LIFT  # it did seal, and broke in the first bit of the lift
+            cause = Cause.LOST_IN_LIFT  # the seal was made and broke at the start of the lift
         if cause is not Cause.LIFTED and gripper.target in self._off_the_table():
             cause = Cause.OFF_THE_TABLE
-        return Made(
+        return JudgedAttempt(
             decision=decision,
             cause=cause,
             target=self.items[gripper.target].name if gripper.target else "",
@@ -148,6 +198,7 @@ class Clutter:
         )
 
     def _off_the_table(self) -> set[int]:
+        """Ids of the bodies that fell off the table."""
         return {i for i, body in self.bodies.items() if body.world_from_object[2, 3] < _GONE_M}
 
 
@@ -158,11 +209,31 @@ def run_clutter(
     predict: Predict,
     config: RunConfig,
     rng: np.random.Generator,
-) -> list[Made]:
-    """Attempts until the table is empty, or too many were made or failed in a row."""
+) -> list[JudgedAttempt]:
+    """Make attempts until the table is empty, or the number of attempts or failures is reached.
+
+    Parameters
+    ----------
+    scene
+        The clutter.
+    objects
+        Catalogue entry of each object by its name.
+    policy
+        Name of the policy.
+    predict
+        Network that rates grasps.
+    config
+        The run; section evaluate holds the limits.
+    rng
+        Draws the policy's candidates and the sensors' noise.
+
+    Returns
+    -------
+    The attempts in their order.
+    """
     clutter = Clutter(scene, objects, config, rng)
-    strategy = strategy_of(policy, predict, config)
-    attempts: list[Made] = []
+    strategy = build_strategy(policy, predict, config)
+    attempts: list[JudgedAttempt] = []
     failed_contacts_m: list[Float[np.ndarray, " 3"]] = []
     in_a_row = 0
     while (
@@ -170,9 +241,9 @@ def run_clutter(
         and len(attempts) < config.evaluate.attempts_per_clutter
         and in_a_row < config.evaluate.failures_per_clutter
     ):
-        made = clutter.attempted(strategy, failed_contacts_m)
+        made = clutter.make_attempt(strategy, failed_contacts_m)
         attempts.append(made)
-        # What did not hold once is tried again only where nothing else is left.
+        # A place that failed is tried again only where no other is left.
         failed_contacts_m += made.decision.failed_contacts_m
         if made.cause is Cause.LIFTED:
             in_a_row = 0

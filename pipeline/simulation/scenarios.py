@@ -1,7 +1,8 @@
-"""Supplement VIII as scenes: transparent, flush neighbours, slim, moving; and a plain one beside.
+"""The failure modes of Supplement VIII as scenes: transparent, touching, slim and moving objects.
 
-Each is one or two boxes on the table, turned and placed at random from trial to trial, so that a
-row of results says one thing.
+Each scenario is one or two boxes on the table, at a random place and angle in each trial. All else
+stays the same, so that a row of the results shows the effect of one property. A plain box is the
+comparison.
 """
 
 import math
@@ -23,18 +24,24 @@ _FACE_M = 0.006  # faces no larger than the pad's cells
 
 @dataclass(frozen=True)
 class Scenario:
-    """What lies on the table, and how fast it passes.
+    """What lies on the table, and how fast it moves.
 
     Attributes
     ----------
+    name
+        Name in the table of results.
     sides_m
-        Of each box.
+        Sides of each box [m].
+    count
+        Number of boxes.
     gap_m
-        Between two boxes that stand side by side along their y.
+        Distance between two boxes side by side along their y axis [m].
+    material
+        Opaque or transparent.
     speed_m_s
-        Along world x, as on a conveyor.
+        Speed along world x, as on a conveyor [m/s].
     segmented
-        Whether objects are told by colour.
+        Whether pictures tell which object each pixel shows.
     """
 
     name: str
@@ -63,21 +70,38 @@ SCENARIOS = (
 )
 
 
-def seeing(config: RunConfig, scenario: Scenario) -> RunConfig:
-    """The run's configuration, with segmented pictures where the scenario has them, only there."""
+def with_segmentation(config: RunConfig, scenario: Scenario) -> RunConfig:
+    """The run's configuration, with segmented pictures exactly where the scenario asks for them."""
     segmentation = "ideal" if scenario.segmented else "none"
     evaluate = config.evaluate.model_copy(update={"segmentation": segmentation})
     return config.model_copy(update={"evaluate": evaluate})
 
 
-def trials(
+def make_trials(
     scenario: Scenario, count: int, density_kg_m3: float, rng: np.random.Generator
 ) -> Iterator[tuple[ClutterScene, dict[str, CatalogueObject]]]:
-    """So many scenes of a kind."""
+    """Make scenes of one scenario, each with its boxes at a random place and angle.
+
+    Parameters
+    ----------
+    scenario
+        What lies on the table.
+    count
+        Number of scenes.
+    density_kg_m3
+        Density of the boxes [kg/m^3].
+    rng
+        Draws places and angles.
+
+    Yields
+    ------
+    tuple[ClutterScene, dict[str, CatalogueObject]]
+        A scene, and its objects by name.
+    """
     item = _box(scenario, density_kg_m3)
     for number in range(count):
         middle = np.array([*rng.uniform(-0.1, 0.1, 2), 0.0])
-        # What passes begins upstream.
+        # A moving box starts upstream of the middle.
         middle[0] -= 0.2 if scenario.speed_m_s else 0.0
         angle = rng.uniform(-math.pi, math.pi)
         step = scenario.sides_m[1] + scenario.gap_m
@@ -85,7 +109,7 @@ def trials(
             PlacedObject(
                 item.name,
                 index + 1,
-                _standing(middle, angle, (index - (scenario.count - 1) / 2) * step, scenario),
+                _box_pose(middle, angle, (index - (scenario.count - 1) / 2) * step, scenario),
             )
             for index in range(scenario.count)
         )
@@ -96,9 +120,10 @@ def trials(
         yield scene, {item.name: item}
 
 
-def _standing(
+def _box_pose(
     middle_m: Float[np.ndarray, " 3"], angle_rad: float, aside_m: float, scenario: Scenario
 ) -> Float[np.ndarray, "4 4"]:
+    """world_from_object of a box on the table, moved sideways along its own y axis."""
     cosine, sine = math.cos(angle_rad), math.sin(angle_rad)
     pose = np.eye(4)
     pose[:2, :2] = [[cosine, -sine], [sine, cosine]]
@@ -108,6 +133,7 @@ def _standing(
 
 
 def _box(scenario: Scenario, density_kg_m3: float) -> CatalogueObject:
+    """The scenario's box as an object of the catalogue."""
     shape = trimesh.creation.box(scenario.sides_m).subdivide_to_size(_FACE_M)
     mesh = Mesh(np.asarray(shape.vertices, np.float64), np.asarray(shape.faces, np.int64))
     coarse = trimesh.creation.box(scenario.sides_m)

@@ -1,8 +1,9 @@
-"""What a sealed pad can hold as the label has it, in newtons: Eq. (7)-(11) at a named vacuum.
+"""Loads that a sealed pad bears according to the label, in newtons: Eq. (7)-(11) at a given vacuum.
 
 Eq. (7) gives the vacuum force, Eq. (8)-(11) what friction bears along and about the surface.
-The supplement ignores moments about x and y (A-3); a lifted object has weight, so they are
-bounded here by the vacuum force at the lever r_v: the pad peels when its rim unloads.
+The supplement ignores moments about x and y (A-3). A lifted object has weight and exerts such
+moments, so they are limited here to the vacuum force at the lever r_v: beyond that the rim of the
+pad carries no load and the pad peels off.
 """
 
 import math
@@ -20,10 +21,23 @@ from pipeline.gripper.wrench import vacuum_force
 
 
 @dataclass(frozen=True)
-class Holding:
-    """Limits of a seal: pull and side forces [N], torsion and peel moments [N m], p of Eq. (2).
+class SealLimits:
+    """Greatest loads that a seal bears.
 
-    seal_min : least p that bears anything.
+    Attributes
+    ----------
+    pressure
+        p of Eq. (2).
+    pull_n
+        Force away from the pad, Eq. (10) [N].
+    side_n
+        Force along the surface, on each axis, Eq. (8), (9) [N].
+    torsion_nm
+        Moment about the pad's axis, Eq. (11) [N m].
+    peel_nm
+        Moment about an axis in the surface [N m].
+    seal_min
+        Least p at which the seal holds anything.
     """
 
     pressure: float
@@ -41,8 +55,15 @@ class Holding:
     def bears(self, load: Float[np.ndarray, " 6"]) -> bool:
         """Whether a load is within every limit.
 
-        load : force [N] and moment [N m] that the object exerts on the pad, in GCS; a pull
-        away from the pad is along -z.
+        Parameters
+        ----------
+        load
+            Force [N] and moment [N m] that the object exerts on the pad, in GCS, shape (6,); a pull
+            away from the pad is along -z.
+
+        Returns
+        -------
+        False where the seal breaks.
         """
         return (
             max(-float(load[2]), 0.0) <= self.pull_n
@@ -52,21 +73,39 @@ class Holding:
         )
 
 
-def holding(
+def seal_limits(
     pad: Pad,
     heights_m: Float[np.ndarray, " vertices"],
     on_target: Bool[np.ndarray, " vertices"],
     gripper: GripperConfig,
     suction: SuctionConfig,
-) -> Holding:
-    """Limits of the pad draped on the heights under it."""
+) -> SealLimits:
+    """Drape the pad over the surface below it and find what its seal bears.
+
+    Parameters
+    ----------
+    pad
+        The pad in GCS.
+    heights_m
+        Height of the surface under each vertex, z in GCS [m], shape (vertices,).
+    on_target
+        Vertices over the target object, shape (vertices,).
+    gripper
+        Contact physics.
+    suction
+        The vacuum, and the least p that seals.
+
+    Returns
+    -------
+    The limits; all 0 where the pad touches nothing.
+    """
     draped = drape(pad, heights_m[None])[0]
     contact = contact_of(pad, draped, contact_vertices(pad, draped, heights_m, on_target))
     if not contact.triangles.size:
-        return Holding(0.0, 0.0, 0.0, 0.0, 0.0, suction.seal_min)
+        return SealLimits(0.0, 0.0, 0.0, 0.0, 0.0, suction.seal_min)
     force_n = suction.vacuum_pa * pad.area_m2 * vacuum_force(pad, contact)  # Eq. (7)
     side_n = math.sqrt(3) / 3 * gripper.friction * force_n  # Eq. (8), (9)
-    return Holding(
+    return SealLimits(
         pressure=contact.pressure,
         pull_n=force_n,  # Eq. (10)
         side_n=side_n,

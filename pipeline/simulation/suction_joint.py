@@ -1,7 +1,7 @@
 """The breakable joint between pad and object: a damped spring whose force is known exactly.
 
-A drive of the physics engine would hold as well, but tells nobody how hard; this one is applied
-as a force, so what the pad bears is what the object feels, with the sign turned.
+A drive of the physics engine would hold the object too, but does not report its force. So the
+spring is applied here as a force on the object, and the load on the pad is its exact opposite.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,21 @@ _GRAVITY = np.array([0.0, 0.0, -9.81])  # standard gravity to three digits
 
 @dataclass(eq=False)
 class SuctionJoint:
-    """An object that hangs on the pad, until its load is more than the seal holds."""
+    """An object that is held by the pad until its load is more than the seal bears.
+
+    Attributes
+    ----------
+    body
+        The object in the world.
+    item
+        Its catalogue entry.
+    limits
+        The loads that the seal bears.
+    gripper_from_object
+        Pose of the object in GCS when it was sealed, shape (4, 4).
+    rises_from_m
+        Height of its centre in WCS when it was sealed [m].
+    """
 
     body: Body
     item: CatalogueObject
@@ -30,14 +44,30 @@ class SuctionJoint:
     rises_from_m: float
 
     @classmethod
-    def closed(
+    def close(
         cls,
         body: Body,
         item: CatalogueObject,
         limits: Bearing,
         world_from_gripper: Float[np.ndarray, "4 4"],
     ) -> "SuctionJoint":
-        """The joint as it closes: the object stays where it is against the pad."""
+        """Make the joint; the object keeps its present pose against the pad.
+
+        Parameters
+        ----------
+        body
+            The object in the world.
+        item
+            Its catalogue entry.
+        limits
+            The loads that the seal bears.
+        world_from_gripper
+            Present pose of the gripper, shape (4, 4).
+
+        Returns
+        -------
+        The joint.
+        """
         roll_freely(body, free=True)
         body.rigid.wake_up()
         pose = body.world_from_object
@@ -46,10 +76,20 @@ class SuctionJoint:
     def carry(
         self, world_from_gripper: Float[np.ndarray, "4 4"]
     ) -> tuple[Float[np.ndarray, " 6"], bool]:
-        """One physics step: pull the object along; the load on the pad, and whether it holds.
+        """Apply the spring's force for one physics step, unless the load breaks the seal.
 
-        The load is what the object exerts on the pad, in GCS at the pad's centre: its weight,
-        what accelerates it, and what it touches, for all of these draw on the spring.
+        The load contains the object's weight, its inertia and its contacts, because all of them
+        stretch the spring.
+
+        Parameters
+        ----------
+        world_from_gripper
+            Present pose of the gripper, shape (4, 4).
+
+        Returns
+        -------
+        Force [N] and moment [N m] that the object exerts on the pad's centre, in GCS, shape (6,);
+        and whether the seal holds.
         """
         placed = self.body.entity.pose
         now = pose_of(placed.p.astype(np.float64), placed.q.astype(np.float64))
@@ -73,9 +113,9 @@ class SuctionJoint:
         return load, True
 
     def open(self) -> None:
-        """Let go of the object."""
+        """Release the object."""
         roll_freely(self.body, free=False)
 
     def risen_m(self) -> float:
-        """How far the object is above where it was sealed."""
+        """Height of the object above where it was sealed [m]."""
         return float(self.body.world_from_object[2, 3]) - self.rises_from_m

@@ -7,7 +7,7 @@ import trimesh
 
 from pipeline.config.cameras import WristCameraConfig
 from pipeline.geometry.mesh import Mesh
-from pipeline.sensing.depth_by_rays import measured, window_around
+from pipeline.sensing.depth_by_rays import measure_depth, window_around
 from pipeline.world.cameras import PinholeCamera, camera_at
 from pipeline.world.posed_bodies import PosedBodies, PosedScene
 
@@ -28,16 +28,16 @@ def from_above() -> PinholeCamera:
 
 def test_depth_of_a_box_and_the_table() -> None:
     camera = from_above()
-    depth, _ = measured(camera, box_on_table(), None, None)
+    depth, _ = measure_depth(camera, box_on_table(), None, None)
     np.testing.assert_allclose(depth[60, 80], 0.5, atol=1e-5)
     np.testing.assert_allclose(depth[5, 5], 0.6, atol=1e-4)
 
 
 def test_a_window_shows_what_the_picture_shows_there() -> None:
     camera, scene = from_above(), box_on_table()
-    whole, _ = measured(camera, scene, None, None)
+    whole, _ = measure_depth(camera, scene, None, None)
     window = window_around(camera, np.array([0.04, 0.02, 0.1]), 0.03)
-    part, _ = measured(window, scene, None, None)
+    part, _ = measure_depth(window, scene, None, None)
     left, top = (camera.intrinsics - window.intrinsics)[:2, 2].round().astype(int)
     assert part.size < 0.2 * whole.size
     np.testing.assert_allclose(
@@ -49,5 +49,5 @@ def test_behind_a_transparent_box_the_table_is_measured() -> None:
     camera = replace(from_above(), sensor="ideal")
     nothing = PosedBodies({}, 1.2).at({})
     rng = np.random.default_rng(0)
-    depth, _ = measured(camera, box_on_table(), nothing, rng)
+    depth, _ = measure_depth(camera, box_on_table(), nothing, rng)
     np.testing.assert_allclose(depth[60, 80], 0.6, atol=1e-4)

@@ -28,7 +28,7 @@ from pipeline.geometry.shape import nsvr, shape_class
 from pipeline.geometry.transforms import invert, transform_points
 from pipeline.sensing.depth_noise import NOISE_MODELS, cosine_of_incidence, disturb
 from pipeline.sensing.ray_rendering import RayRenderer
-from pipeline.sensing.rendering import Renderer, new_renderer, rendered
+from pipeline.sensing.rendering import Renderer, new_renderer, render_views
 from pipeline.sensing.sapien_rendering import SapienRenderer
 from pipeline.sensing.sub_cloud import merged_sub_clouds, sub_clouds
 from pipeline.world.cameras import (
@@ -85,7 +85,7 @@ CUBE_AND_BALL = scene_of(
 def view(objects: Mapping[str, CatalogueObject]) -> CameraView:
     """Cube and ball seen by rays."""
     renderer = RayRenderer(ScenesConfig())
-    return rendered(CUBE_AND_BALL, objects, CAMERAS, renderer).views[0]
+    return render_views(CUBE_AND_BALL, objects, CAMERAS, renderer).views[0]
 
 
 @pytest.fixture(scope="module")
@@ -109,7 +109,7 @@ def test_depth_puts_every_pixel_on_its_surface(
     if renderer == "sapien":
         driver: Renderer = request.getfixturevalue("sapien_renderer")
         objects = request.getfixturevalue("objects")
-        view = rendered(CUBE_AND_BALL, objects, CAMERAS, driver).views[0]
+        view = render_views(CUBE_AND_BALL, objects, CAMERAS, driver).views[0]
         inner = interior(view)
         view = replace(view, depth_m=np.where(inner, view.depth_m, 0.0))
     points, rows, columns = points_of_depth(view.depth_m, view.camera, 1)
@@ -140,9 +140,9 @@ def test_sapien_and_rays_agree(
     )
     assert [camera.name for camera in cameras] == ["static_0", "wrist_0", "wrist_1"]
     assert camera_names(CamerasConfig()) == [camera.name for camera in cameras]
-    by_rays = rendered(CUBE_AND_BALL, objects, cameras, RayRenderer(ScenesConfig())).views
-    by_sapien = rendered(CUBE_AND_BALL, objects, cameras, sapien_renderer).views
-    again = rendered(CUBE_AND_BALL, objects, cameras, sapien_renderer).views
+    by_rays = render_views(CUBE_AND_BALL, objects, cameras, RayRenderer(ScenesConfig())).views
+    by_sapien = render_views(CUBE_AND_BALL, objects, cameras, sapien_renderer).views
+    again = render_views(CUBE_AND_BALL, objects, cameras, sapien_renderer).views
     for one, two, rays in zip(by_sapien, again, by_rays, strict=True):
         assert one.depth_m.tobytes() == two.depth_m.tobytes()
         assert one.colour.tobytes() == two.colour.tobytes()
@@ -196,8 +196,8 @@ def test_what_is_transparent_is_measured_through(objects: Mapping[str, Catalogue
         PlacedObject("cube", 1, at(-0.1, 0, 0.05)), PlacedObject("glass ball", 2, at(0.1, 0, 0.05))
     )
     renderer = RayRenderer(ScenesConfig())
-    seen = rendered(glass, objects, CAMERAS, renderer).views[0]
-    opaque = rendered(CUBE_AND_BALL, objects, CAMERAS, renderer).views[0]
+    seen = render_views(glass, objects, CAMERAS, renderer).views[0]
+    opaque = render_views(CUBE_AND_BALL, objects, CAMERAS, renderer).views[0]
     assert opaque.behind_m is None
     np.testing.assert_array_equal(seen.depth_m, opaque.depth_m)
     on_glass = seen.segmentation == 2
@@ -309,7 +309,7 @@ def test_grid_matches_a_plain_loop(
     beside = StaticCameraConfig(
         azimuths_rad=azimuths_rad, elevations_rad=(1.0,) * len(azimuths_rad)
     )
-    views = rendered(
+    views = render_views(
         CUBE_AND_BALL, objects, static_cameras(beside), RayRenderer(ScenesConfig())
     ).views
     pictures = [(view.depth_m.astype(np.float64), view.camera) for view in views]
@@ -405,9 +405,9 @@ def test_pictures_are_lit_where_convex_parts_are_computed_too() -> None:
         "from pipeline.config import ScenesConfig, StaticCameraConfig\n"
         "from pipeline.errors import MachineError\n"
         "from pipeline.world.cameras import static_cameras\n"
-        "from pipeline.sensing.sapien_rendering import rendered_table\n"
+        "from pipeline.sensing.sapien_rendering import render_table\n"
         "try:\n"
-        "    rendered_table(ScenesConfig(), static_cameras(StaticCameraConfig())[0])\n"
+        "    render_table(ScenesConfig(), static_cameras(StaticCameraConfig())[0])\n"
         "except MachineError as error:\n"
         "    print(error)\n"
     )

@@ -20,7 +20,7 @@ from pipeline.gripper.pad import build_pad
 from pipeline.physics.engine import add_body, new_world
 from pipeline.simulation.gripper_body import SuctionGripper
 from pipeline.simulation.iiwa14 import flange_from_gripper
-from pipeline.simulation.picking import mover_of
+from pipeline.simulation.picking import build_mover
 from tests.bodies import catalogue_object, pose_at
 from tests.simulation.kinematics import flange_pose
 
@@ -48,7 +48,7 @@ def gripper_over(
     world = new_world(config.scenes, render=False)
     lowest = float(item.mesh.vertices_m[:, 2].min())
     body = add_body(world, item, pose_at(0, 0, -lowest), 1, (0.5, 0.5, 0.5), config.scenes)
-    mover = mover_of(world, config)
+    mover = build_mover(world, config)
     pad = build_pad(config.gripper.pad)
     return SuctionGripper(world, {1: body}, {1: item}, pad, config, mover)
 

@@ -15,8 +15,8 @@ from pipeline.geometry.mesh import Mesh
 from pipeline.gripper.pad import build_pad
 from pipeline.physics.engine import add_body, new_world
 from pipeline.simulation.gripper_body import SuctionGripper
-from pipeline.simulation.judges import LabelJudge, RefereeJudge, judge_of
-from pipeline.simulation.picking import mover_of
+from pipeline.simulation.judges import LabelJudge, RefereeJudge, build_judge
+from pipeline.simulation.picking import build_mover
 from pipeline.world.posed_bodies import PosedBodies, PosedScene
 from tests.bodies import catalogue_object, pose_at
 
@@ -40,14 +40,14 @@ def pulling(force_n: float) -> np.ndarray:
 
 
 def test_the_judge_is_named_in_the_configuration() -> None:
-    assert isinstance(judge_of(RunConfig(), PAD), RefereeJudge)
+    assert isinstance(build_judge(RunConfig(), PAD), RefereeJudge)
     label = RunConfig(evaluate=EvaluateConfig(judge="label"))
-    assert isinstance(judge_of(label, PAD), LabelJudge)
+    assert isinstance(build_judge(label, PAD), LabelJudge)
 
 
 @pytest.mark.parametrize("judge", [RefereeJudge(CONFIG), LabelJudge(CONFIG, PAD)])
 def test_a_block_seals_and_the_table_does_not(judge: RefereeJudge | LabelJudge) -> None:
-    found = judge.sealed(pose_at(0, 0, TOP_M), scene(block()))
+    found = judge.find_seal(pose_at(0, 0, TOP_M), scene(block()))
     assert found is not None
     body, bearing = found
     assert body == 3
@@ -55,11 +55,11 @@ def test_a_block_seals_and_the_table_does_not(judge: RefereeJudge | LabelJudge) 
     assert bearing.pressure > 0.95
     assert bearing.bears(pulling(5.0))
     assert not bearing.bears(pulling(50.0))
-    assert judge.sealed(pose_at(0.3, 0.3, 0.0), scene(block())) is None
+    assert judge.find_seal(pose_at(0.3, 0.3, 0.0), scene(block())) is None
 
 
 def test_the_referee_bears_a_closed_fans_vacuum_less_the_leak() -> None:
-    found = RefereeJudge(CONFIG).sealed(pose_at(0, 0, TOP_M), scene(block()))
+    found = RefereeJudge(CONFIG).find_seal(pose_at(0, 0, TOP_M), scene(block()))
     assert found is not None
     assert found[1].bears(pulling(0.95 * FULL_N))
     assert not found[1].bears(pulling(FULL_N))
@@ -69,7 +69,7 @@ def test_past_the_edge_the_referee_bears_less() -> None:
     pressures = [
         found[1].pressure
         for x_m in (0.0, 0.02, 0.03, 0.04)
-        if (found := RefereeJudge(CONFIG).sealed(pose_at(x_m, 0, TOP_M), scene(block())))
+        if (found := RefereeJudge(CONFIG).find_seal(pose_at(x_m, 0, TOP_M), scene(block())))
     ]
     assert len(pressures) == 4
     assert (np.diff(pressures) < 0).all()
@@ -82,7 +82,7 @@ def gripper_over(
     item = catalogue_object("it", shape, cache, density_kg_m3)
     world = new_world(config.scenes, render=False)
     body = add_body(world, item, pose_at(0, 0, 0.02), 1, (0.5, 0.5, 0.5), config.scenes)
-    return SuctionGripper(world, {1: body}, {1: item}, PAD, config, mover_of(world, config))
+    return SuctionGripper(world, {1: body}, {1: item}, PAD, config, build_mover(world, config))
 
 
 def hangs(gripper: SuctionGripper, x_m: float = 0.0) -> bool:
@@ -133,7 +133,7 @@ def test_a_weaker_fan_loses_what_a_stronger_one_holds(tmp_path: Path) -> None:
 
 
 def test_asking_for_a_load_takes_less_than_a_physics_step_of_simulated_time() -> None:
-    found = RefereeJudge(CONFIG).sealed(pose_at(0.02, 0, TOP_M), scene(block()))
+    found = RefereeJudge(CONFIG).find_seal(pose_at(0.02, 0, TOP_M), scene(block()))
     assert found is not None
     start = time.process_time()
     for share in np.linspace(0.1, 1.0, 50):

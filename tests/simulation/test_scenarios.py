@@ -6,8 +6,8 @@ import pytest
 from pipeline.config import RunConfig
 from pipeline.control.decision import Cause
 from pipeline.control.ranking import Predict
-from pipeline.simulation.picking import Clutter, strategy_of
-from pipeline.simulation.scenarios import SCENARIOS, seeing, trials
+from pipeline.simulation.picking import Clutter, build_strategy
+from pipeline.simulation.scenarios import SCENARIOS, make_trials, with_segmentation
 
 BY_NAME = {scenario.name: scenario for scenario in SCENARIOS}
 CONFIG = RunConfig()
@@ -25,11 +25,11 @@ def flatness(cloud: np.ndarray, seen: np.ndarray) -> np.ndarray:
 def tried(name: str, predict: Predict = flatness, seed: int = 0) -> tuple[Cause, Clutter]:
     rng = np.random.default_rng(seed)
     scenario = BY_NAME[name]
-    scene, objects = next(trials(scenario, 1, 300.0, rng))
-    config = seeing(CONFIG, scenario)
+    scene, objects = next(make_trials(scenario, 1, 300.0, rng))
+    config = with_segmentation(CONFIG, scenario)
     clutter = Clutter(scene, objects, config, rng)
     clutter.gripper.conveyor_m_s = scenario.speed_m_s
-    return clutter.attempted(strategy_of("closed-loop", predict, config), []).cause, clutter
+    return clutter.make_attempt(build_strategy("closed-loop", predict, config), []).cause, clutter
 
 
 def test_a_plain_box_is_lifted() -> None:
@@ -51,7 +51,7 @@ def test_a_transparent_box_is_found_by_its_outline_alone(seed: int) -> None:
 @pytest.mark.parametrize("name", ["flush neighbours", "slim, side by side"])
 def test_neighbours_stand_at_their_gap_and_level(name: str) -> None:
     scenario = BY_NAME[name]
-    scene, _ = next(trials(scenario, 1, 300.0, np.random.default_rng(1)))
+    scene, _ = next(make_trials(scenario, 1, 300.0, np.random.default_rng(1)))
     first, second = (placed.world_from_object[:3, 3] for placed in scene.objects)
     gap = np.linalg.norm(first - second) - scenario.sides_m[1]
     assert gap == pytest.approx(scenario.gap_m)
@@ -61,9 +61,9 @@ def test_neighbours_stand_at_their_gap_and_level(name: str) -> None:
 def test_a_box_that_falls_off_is_taken_out_and_named() -> None:
     """Carried over the table's edge while the pad goes for it: the attempt ends, not the run."""
     rng = np.random.default_rng(0)
-    scene, objects = next(trials(BY_NAME["plain"], 1, 300.0, rng))
+    scene, objects = next(make_trials(BY_NAME["plain"], 1, 300.0, rng))
     clutter = Clutter(scene, objects, CONFIG, rng)
     clutter.gripper.conveyor_m_s = 0.8
-    cause = clutter.attempted(strategy_of("closed-loop", flatness, CONFIG), []).cause
+    cause = clutter.make_attempt(build_strategy("closed-loop", flatness, CONFIG), []).cause
     assert cause is not Cause.LIFTED
     assert clutter.bodies == {}

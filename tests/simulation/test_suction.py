@@ -8,7 +8,7 @@ import pytest
 from pipeline.config import GripperConfig
 from pipeline.config.evaluation import SuctionConfig
 from pipeline.gripper.pad import build_pad
-from pipeline.simulation.suction import Holding, holding
+from pipeline.simulation.suction import SealLimits, seal_limits
 from tests.gripper.surfaces import everywhere, plane
 
 GRIPPER, SUCTION = GripperConfig(), SuctionConfig()
@@ -16,7 +16,7 @@ PAD = build_pad(GRIPPER.pad)
 
 
 def test_a_plane_holds_vacuum_times_area() -> None:
-    found = holding(PAD, plane(PAD), everywhere(PAD), GRIPPER, SUCTION)
+    found = seal_limits(PAD, plane(PAD), everywhere(PAD), GRIPPER, SUCTION)
     assert found.pressure == pytest.approx(1.0, abs=1e-9)
     # Reg.V is drawn as a polygon: its area is a little less than the circle's.
     circle_n = SUCTION.vacuum_pa * math.pi * GRIPPER.pad.radius_m**2
@@ -28,19 +28,19 @@ def test_a_plane_holds_vacuum_times_area() -> None:
 
 def test_twice_the_vacuum_holds_twice_as_much() -> None:
     stronger = SuctionConfig(vacuum_pa=2 * SUCTION.vacuum_pa)
-    one = holding(PAD, plane(PAD), everywhere(PAD), GRIPPER, SUCTION)
-    two = holding(PAD, plane(PAD), everywhere(PAD), GRIPPER, stronger)
+    one = seal_limits(PAD, plane(PAD), everywhere(PAD), GRIPPER, SUCTION)
+    two = seal_limits(PAD, plane(PAD), everywhere(PAD), GRIPPER, stronger)
     assert two.pull_n == pytest.approx(2 * one.pull_n)
     assert two.pressure == one.pressure
 
 
 def test_nothing_under_the_pad_holds_nothing() -> None:
     heights = np.full(len(PAD.vertices_xy_m), -np.inf)
-    found = holding(PAD, heights, np.zeros(len(heights), dtype=bool), GRIPPER, SUCTION)
+    found = seal_limits(PAD, heights, np.zeros(len(heights), dtype=bool), GRIPPER, SUCTION)
     assert found.pull_n == found.pressure == 0.0
 
 
-LIMITS = Holding(pressure=1.0, pull_n=10.0, side_n=3.0, torsion_nm=0.05, peel_nm=0.2)
+LIMITS = SealLimits(pressure=1.0, pull_n=10.0, side_n=3.0, torsion_nm=0.05, peel_nm=0.2)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from pipeline.execution import RunFolder
 from pipeline.messages.objects import read_objects
 from pipeline.messages.scenes import read_scenes
 from pipeline.sensing.ray_rendering import RayRenderer
-from pipeline.sensing.rendering import rendered
+from pipeline.sensing.rendering import render_views
 from stages.gallery import make_gallery, portrait_camera
 
 
@@ -19,7 +19,7 @@ def test_all_objects_are_in_the_portrait(run: RunFolder) -> None:
     renderer = RayRenderer(load_run_config(run.config).scenes)
     for scene in read_scenes(run.artifact("scenes")):
         camera = portrait_camera(scene, objects)
-        view = rendered(scene, objects, (camera,), renderer).views[0]
+        view = render_views(scene, objects, (camera,), renderer).views[0]
         assert set(np.unique(view.segmentation)) >= {p.body_id for p in scene.objects}
         edge = [view.segmentation[i] for i in (0, -1)] + [view.segmentation[:, i] for i in (0, -1)]
         assert not np.concatenate(edge).any()

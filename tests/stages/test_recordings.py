@@ -14,7 +14,7 @@ from rerun.chunk import RrdReader
 from pipeline.errors import MachineError
 from pipeline.execution import RunFolder
 from pipeline.recording.recording import LARGEST_MB, ROOTS, TIMELINES
-from pipeline.recording.viewer import Sight, sight_of
+from pipeline.recording.viewer import ViewerState, photograph
 from stages.graph import STAGES
 
 # Least share of a view that is drawn, beyond what an empty one has of words and grid.
@@ -27,9 +27,9 @@ def drawn_share(png: bytes) -> float:
     return float((pixels.max(axis=2) > 90).mean())
 
 
-def seen_or_skipped(recording: Path) -> Sight:
+def seen_or_skipped(recording: Path) -> ViewerState:
     try:
-        return sight_of(recording)
+        return photograph(recording)
     except MachineError as error:
         pytest.skip(f"the viewer needs a graphics driver: {error}")
 
@@ -47,11 +47,11 @@ def empty_share(tmp_path_factory: pytest.TempPathFactory) -> float:
 
 
 @pytest.fixture(scope="module", params=sorted(STAGES))
-def seen(request: pytest.FixtureRequest, run: RunFolder) -> tuple[str, Sight]:
+def seen(request: pytest.FixtureRequest, run: RunFolder) -> tuple[str, ViewerState]:
     return request.param, seen_or_skipped(run.recording(request.param))
 
 
-def test_the_viewer_shows_all_of_it(seen: tuple[str, Sight], empty_share: float) -> None:
+def test_the_viewer_shows_all_of_it(seen: tuple[str, ViewerState], empty_share: float) -> None:
     stage, sight = seen
     assert sight.problems == ()
     assert sight.timeline == TIMELINES[stage]

@@ -14,7 +14,7 @@ from pipeline.config.written import as_toml
 from pipeline.execution import RunFolder
 from pipeline.messages.grasp_columns import read_columns
 from pipeline.recording.recording import TIMELINES
-from pipeline.recording.viewer import sight_of
+from pipeline.recording.viewer import photograph
 from stages.referee import judge, predicted, prepare
 
 
@@ -81,7 +81,7 @@ def test_figures_are_of_every_score(made: RunFolder) -> None:
 
 
 def test_the_recording_is_seen(made: RunFolder) -> None:
-    sight = sight_of(made.recording("referee"))
+    sight = photograph(made.recording("referee"))
     assert sight.problems == ()
     assert sight.timeline == TIMELINES["referee"]
 
