@@ -1,4 +1,4 @@
-"""What the stages of softgrip are made of; imports nothing from ``stages``."""
+"""The library of softgrip, which the commands in `stages` call; it imports nothing from them."""
 
 import importlib
 import os

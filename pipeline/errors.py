@@ -1,15 +1,15 @@
-"""The one family of errors a person is meant to read."""
+"""The errors that are reported to the user as one sentence."""
 
 
 class SoftgripError(Exception):
-    """A failure with a cause and a way out, both in one sentence.
+    """An error with its reason and its remedy.
 
     Parameters
     ----------
     what
-        The subject and what is wrong with it, naming the file or field.
+        What is wrong, naming the file or field.
     remedy
-        What the reader can do about it.
+        What the user can do about it.
     """
 
     def __init__(self, what: str, remedy: str) -> None:
@@ -18,12 +18,12 @@ class SoftgripError(Exception):
         super().__init__(f"{what}. {remedy}")
 
     def __reduce__(self) -> tuple[type["SoftgripError"], tuple[str, str]]:
-        """Cross process borders: exceptions pickle their message, not their parts."""
+        """Pickle both parts, so that the error can be raised again in another process."""
         return type(self), (self.what, self.remedy)
 
 
 class ConfigError(SoftgripError):
-    """A run's configuration cannot be used as it stands."""
+    """The configuration of a run is invalid."""
 
 
 class MeshError(SoftgripError):
@@ -31,26 +31,26 @@ class MeshError(SoftgripError):
 
 
 class ArtifactError(SoftgripError):
-    """A file between two stages is missing, damaged or of another version."""
+    """A file that one stage hands to another is missing, damaged or of another version."""
 
 
 class ContentError(ArtifactError):
-    """What a message holds cannot be used; the reader of its file adds the file's name."""
+    """The content of a message is invalid; the reader of the file adds the file's name."""
 
     def __init__(self, what: str, remedy: str = "The file is damaged: make it again") -> None:
         super().__init__(what, remedy)
 
 
 class PictureError(SoftgripError):
-    """A picture, a point cloud or a camera's description from outside cannot be used."""
+    """A picture, point cloud or camera file of the user is invalid."""
 
 
 class PoseError(SoftgripError):
-    """A pose that was given is no rigid motion."""
+    """A given pose is not a rigid motion."""
 
 
 class SceneError(SoftgripError):
-    """A clutter scene misses its level's definition."""
+    """A clutter scene does not meet the definition of its level."""
 
 
 class MachineError(SoftgripError):

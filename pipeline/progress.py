@@ -1,4 +1,4 @@
-"""Progress of anything longer than a few seconds: rate and remaining time."""
+"""A progress bar for loops that take more than a few seconds."""
 
 import sys
 from collections.abc import Iterable
@@ -12,7 +12,23 @@ QUIET_INTERVAL_S = 10.0  # a log file gets a line now and then, a screen gets a 
 
 
 def progress(items: Iterable[T], total: int, what: str, unit: str) -> Iterable[T]:
-    """Pass items through while showing how far, how fast and how long still."""
+    """Yield the items and show progress, rate and remaining time on standard error.
+
+    Parameters
+    ----------
+    items
+        What is passed through.
+    total
+        Number of items.
+    what
+        Name of the work.
+    unit
+        Name of one item.
+
+    Returns
+    -------
+    The same items, in their order.
+    """
     on_screen = sys.stderr.isatty()
     return tqdm(
         items,

@@ -1,4 +1,4 @@
-"""Processor time, which does not depend on what else runs on the machine."""
+"""Processor time: unlike wall time it does not grow when other programs use the machine."""
 
 import os
 import time
@@ -7,10 +7,11 @@ from contextlib import contextmanager
 
 
 class Stopwatch:
-    """Sums the processor time of the blocks that run under it [s]; blocks must not be nested.
+    """Adds up the processor time [s] of blocks of code; blocks must not be nested.
 
-    Rerun encodes and writes in threads of its own. Where a block only records, the time of the
-    whole process counts; where it also does a stage's work, the time of the thread that logs.
+    Rerun encodes and writes in threads of its own. So the time of the whole process is counted for
+    a block that only records, and the time of the calling thread for a block that also does other
+    work.
     """
 
     def __init__(self) -> None:
@@ -18,7 +19,18 @@ class Stopwatch:
 
     @contextmanager
     def running(self, whole_process: bool = False) -> Iterator[None]:
-        """Count one block: the time of this thread, or of the whole process."""
+        """Count the processor time of a block.
+
+        Parameters
+        ----------
+        whole_process
+            Whether all threads are counted, or only the one that runs the block.
+
+        Yields
+        ------
+        None
+            Nothing.
+        """
         clock = time.process_time if whole_process else time.thread_time
         started = clock()
         try:

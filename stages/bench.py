@@ -88,7 +88,7 @@ def measure_all() -> None:
 
 
 def open_bench(folder: RunFolder) -> Bench:
-    """The run's scenes and meshes."""
+    """Read the run's scenes and meshes."""
     objects = read_objects(folder.artifact("objects"))
     return Bench(
         folder,
@@ -102,7 +102,7 @@ def open_bench(folder: RunFolder) -> Bench:
 def labelled_scene(
     bench: Bench, scene: ClutterScene, wanted: int, rng: np.random.Generator
 ) -> labelling.Labelled:
-    """Scene to grasps, its ray scene included."""
+    """Label a scene, including the time to build its surfaces for rays."""
     return label_scene(scene, surfaces_of(bench, scene), bench.config, wanted, rng)
 
 

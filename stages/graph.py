@@ -136,7 +136,7 @@ def key(stage: str, run: RunName = "default", mesh_dir: MeshDir = None) -> None:
 
 @app.command()
 def status(run: RunName = "default", mesh_dir: MeshDir = None) -> None:
-    """Say of every stage whether it is fresh, and if not, why."""
+    """Print for every stage whether it is up to date, and if not, why."""
     folder = RunFolder(RUNS_DIR / run)
     stale: set[str] = set()
     for name, stage in STAGES.items():
@@ -148,7 +148,7 @@ def status(run: RunName = "default", mesh_dir: MeshDir = None) -> None:
 
 @app.command()
 def fresh(stage: str, run: RunName = "default") -> None:
-    """The closing line of a Make goal."""
+    """Print the last line of a Make goal: the stage is up to date."""
     sys.stdout.write(f"{RunFolder(RUNS_DIR / run).artifact(stage)} is up to date\n")
 
 

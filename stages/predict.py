@@ -43,7 +43,7 @@ THREADS = 2  # cores of the smallest machine that is supported
 
 @dataclass(frozen=True)
 class PredictionFiles:
-    """Where the results appear; what a recording is told of them."""
+    """Paths of the results, and what the recording needs to know of them."""
 
     folder: Path
     key: str

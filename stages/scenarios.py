@@ -41,7 +41,7 @@ class ScenarioJob:
 
 @dataclass(frozen=True)
 class Row:
-    """What came of it."""
+    """Result of one policy in one scenario."""
 
     scenario: str
     policy: str
@@ -72,7 +72,7 @@ def scenarios(
 
 
 def run_scenario(job: ScenarioJob) -> Row:
-    """One attempt at each trial."""
+    """Make one attempt in each trial of a scenario."""
     scenario = SCENARIOS[job.index]
     config = with_segmentation(job.config, scenario)
     strategy = build_strategy(job.policy, network(job.checkpoint).predict, config)
@@ -90,7 +90,7 @@ def run_scenario(job: ScenarioJob) -> Row:
 
 
 def table(rows: list[Row]) -> str:
-    """As a person reads it."""
+    """The results as a Markdown table."""
     lines = []
     for row in rows:
         rate, low, high = success_rate(row.lifted, row.tried)

@@ -73,7 +73,7 @@ def split_of(stage: StageContext, split: str) -> Samples:
 
 
 def print_epoch(epoch: EpochMetrics) -> None:
-    """One line an epoch."""
+    """Print one line about an epoch."""
     logger.info(
         "train: epoch {:3d}  train |e| {:.4f}  val |e| {:.4f}  rate {:.2e}",
         epoch.epoch + 1,

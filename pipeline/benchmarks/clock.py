@@ -20,18 +20,18 @@ class Laps:
         self._last = time.perf_counter()
 
     def start(self) -> None:
-        """Forget the time since the last lap."""
+        """Restart the clock without counting the time since the last lap."""
         self._last = time.perf_counter()
 
     def lap(self, phase: str) -> None:
-        """Book the time since the last lap or start under ``phase``."""
+        """Add the time since the last lap or start to ``phase``."""
         now = time.perf_counter()
         self.seconds[phase] += now - self._last
         self._last = now
 
 
 def seconds_of(call: Callable[[], object], repeats: int) -> float:
-    """Least time of ``repeats`` calls: what the machine's other work disturbs least."""
+    """Shortest time of ``repeats`` calls [s]: the one that other programs disturb least."""
     times = []
     for _ in range(repeats):
         started = time.perf_counter()

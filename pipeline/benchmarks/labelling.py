@@ -127,7 +127,7 @@ def phases(
 
 
 def labelling_rate(label: Callable[[], int], seconds: float) -> float:
-    """Grasps a second of ``label``, which labels some and says how many, over ``seconds``."""
+    """Grasps a second of ``label``, called again and again for ``seconds``; it returns how many."""
     started, labelled = time.perf_counter(), 0
     while time.perf_counter() - started < seconds:
         labelled += label()

@@ -70,7 +70,7 @@ def rates_mb_s(samples: Samples, folder: Path) -> dict[str, float]:
 
 
 def exhaust(batches: Iterable[object]) -> None:
-    """Take every batch, each alive until the next is there, as training does."""
+    """Take every batch; each is kept until the next one is there, as in training."""
     for _ in batches:
         pass
 

@@ -84,7 +84,7 @@ def problems_of(
 
 
 def milliseconds(problems: list[QualityProblem], few: dict[SolverName, int]) -> dict[str, float]:
-    """Solver → milliseconds a problem, on the first ``few[solver]`` problems, one call each."""
+    """Milliseconds a problem by solver, on its first ``few[solver]`` problems, one call each."""
     figures: dict[str, float] = {}
     for name, count in few.items():
         chosen = problems[:count]

@@ -71,7 +71,7 @@ def against_peers(samples: Samples, folder: Path) -> dict[str, dict[str, float]]
 
 
 def samples_of_grasps(grasps: Sequence[LabelledGrasps]) -> Samples:
-    """Labelled grasps as training samples; what storing does not depend on is made up."""
+    """Labelled grasps as training samples; columns that do not affect storage are constants."""
     cloud = np.concatenate([part.cloud for part in grasps])
     count = len(cloud)
     return Samples(
@@ -102,21 +102,21 @@ def checksum(batches: Iterator[dict[str, np.ndarray]]) -> int:
 
 
 def write_mcap(path: Path, parts: list[Samples]) -> None:
-    """As the shards stage does."""
+    """Write MCAP as the shards stage does."""
     with ArtifactWriter(path, PROVENANCE, "none") as artifact:
         for index, part in enumerate(parts):
             artifact.write("/samples", sample_batch(part, ()), log_time_ns=index)
 
 
 def read_mcap(path: Path) -> Iterator[dict[str, np.ndarray]]:
-    """As training does."""
+    """Read MCAP as training does."""
     with open_artifact(path) as artifact:
         for _, message in artifact.messages(SampleBatch):
             yield _stored(samples_of(message))
 
 
 def write_hdf5(path: Path, parts: list[Samples]) -> None:
-    """A dataset a tensor, chunked by batch."""
+    """Write HDF5 with one dataset for each tensor, chunked by batch."""
     with h5py.File(path, "w") as file:
         first = arrays_of(parts[0])
         count = sum(len(part) for part in parts)
@@ -132,14 +132,14 @@ def write_hdf5(path: Path, parts: list[Samples]) -> None:
 
 
 def read_hdf5(path: Path) -> Iterator[dict[str, np.ndarray]]:
-    """Batch by batch."""
+    """Read HDF5 batch by batch."""
     with h5py.File(path) as file:
         for at in range(0, len(file["quality"]), BATCH):
             yield {name: file[name][at : at + BATCH] for name in STORED_AS}
 
 
 def write_zarr(path: Path, parts: list[Samples]) -> None:
-    """An array a tensor, chunked by batch."""
+    """Write Zarr with one array for each tensor, chunked by batch."""
     root = zarr.open_group(path, mode="w")
     count = sum(len(part) for part in parts)
     for name, array in arrays_of(parts[0]).items():
@@ -156,14 +156,14 @@ def write_zarr(path: Path, parts: list[Samples]) -> None:
 
 
 def read_zarr(path: Path) -> Iterator[dict[str, np.ndarray]]:
-    """Batch by batch."""
+    """Read Zarr batch by batch."""
     root = zarr.open_group(path, mode="r")
     for at in range(0, root["quality"].shape[0], BATCH):
         yield {name: np.asarray(root[name][at : at + BATCH]) for name in STORED_AS}
 
 
 def write_webdataset(path: Path, parts: list[Samples]) -> None:
-    """A tar of .npy files, one group a batch."""
+    """Write a tar with a group of .npy files for each batch."""
     with webdataset.TarWriter(str(path)) as tar:
         for index, part in enumerate(parts):
             files = {f"{name}.npy": _npy(array) for name, array in arrays_of(part).items()}
@@ -171,20 +171,20 @@ def write_webdataset(path: Path, parts: list[Samples]) -> None:
 
 
 def read_webdataset(path: Path) -> Iterator[dict[str, np.ndarray]]:
-    """Group by group, decoded by its own pipeline."""
+    """Read the tar group by group with WebDataset's own pipeline."""
     for group in webdataset.WebDataset(str(path), shardshuffle=False).decode():
         yield {name: group[f"{name}.npy"] for name in STORED_AS}
 
 
 def write_numpy(path: Path, parts: list[Samples]) -> None:
-    """A .npy file a tensor: the floor that nothing with an index can reach."""
+    """Write one .npy file for each tensor, the fastest format that has no index."""
     path.mkdir(exist_ok=True)
     for name in STORED_AS:
         np.save(path / f"{name}.npy", np.concatenate([arrays_of(part)[name] for part in parts]))
 
 
 def read_numpy(path: Path) -> Iterator[dict[str, np.ndarray]]:
-    """Memory maps, batch by batch."""
+    """Read memory maps batch by batch."""
     maps = {name: np.load(path / f"{name}.npy", mmap_mode="r") for name in STORED_AS}
     for at in range(0, len(maps["quality"]), BATCH):
         yield {name: array[at : at + BATCH] for name, array in maps.items()}

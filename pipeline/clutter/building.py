@@ -97,7 +97,7 @@ def build_clutter(
 def draw_items(
     pool: Sequence[CatalogueObject], count: int, rng: np.random.Generator
 ) -> list[CatalogueObject]:
-    """``count`` objects in random order, with as few repeats as the pool allows."""
+    """Draw ``count`` objects in random order, each as often as any other, give or take one."""
     rounds = [rng.permutation(len(pool)) for _ in range(-(-count // len(pool)))]
     return [pool[int(i)] for i in np.concatenate(rounds)[:count]]
 
@@ -150,7 +150,7 @@ def _settle_placed(
     config: ScenesConfig,
     rng: np.random.Generator,
 ) -> tuple[list[Float[np.ndarray, "4 4"]], float]:
-    """SE(2): each object at rest alone, placed, then all settled together."""
+    """Place objects that rest alone in SE(2), then let all settle together."""
     surfaces = [Surface(item.mesh) for item in items]
     resting = [resting_pose(item, config, rng) for item in items]
     place = place_isolated if distribution is Distribution.ISOLATED else place_multiple
@@ -167,7 +167,7 @@ def _settle_placed(
 def _settle_pile(
     items: Sequence[CatalogueObject], config: ScenesConfig, rng: np.random.Generator
 ) -> tuple[list[Float[np.ndarray, "4 4"]], float]:
-    """SE(3): a pile; what lies apart from it is dropped onto it again."""
+    """Drop a pile in SE(3); drop again onto the pile each object that lies apart from it."""
     world, bodies, settle_time_s = drop_pile(items, config, rng)
     surfaces = [Surface(item.mesh) for item in items]
     poses: list[Float[np.ndarray, "4 4"]] = []

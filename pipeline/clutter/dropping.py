@@ -1,4 +1,4 @@
-"""Poses that physics decides: one object coming to rest alone, and a pile."""
+"""Poses that physics decides: an object that comes to rest alone, and a pile."""
 
 from collections.abc import Sequence
 
@@ -61,12 +61,12 @@ def resting_pose(
 def drop_pile(
     items: Sequence[CatalogueObject], config: ScenesConfig, rng: np.random.Generator
 ) -> tuple[sapien.Scene, list[Body], float]:
-    """Objects dropped one by one in SE(3) into a column of walls, which then goes away.
+    """Drop objects one by one in SE(3) into a column of four walls, then remove the walls.
 
     Parameters
     ----------
     items
-        What is dropped, in this order.
+        The objects, in the order in which they are dropped.
     config
         Section scenes of the run.
     rng

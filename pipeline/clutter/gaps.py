@@ -189,7 +189,7 @@ def _faces_in(
 
 
 def gap_mm_by_level(scenes: Sequence[ClutterScene]) -> dict[str, dict[str, float]]:
-    """Level to the least and the greatest gap between neighbours of its scenes, in mm."""
+    """Least and greatest gap between neighbours [mm], by level, over all scenes of the level."""
     gaps = {
         str(level): [
             round(1e3 * float(gap), 3)

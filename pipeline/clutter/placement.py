@@ -131,7 +131,7 @@ def place_multiple(
 
 
 def turn_pose(pose: Float[np.ndarray, "4 4"], yaw_rad: float) -> Float[np.ndarray, "4 4"]:
-    """The pose turned about the vertical through its own origin, which moves to x = y = 0."""
+    """The pose turned by ``yaw_rad`` about the vertical, with its origin moved to x = y = 0."""
     out = pose.copy()
     out[:3, :3] = Rotation.from_euler("z", yaw_rad).as_matrix() @ pose[:3, :3]
     out[:2, 3] = 0.0
@@ -139,7 +139,7 @@ def turn_pose(pose: Float[np.ndarray, "4 4"], yaw_rad: float) -> Float[np.ndarra
 
 
 def move_pose(pose: Float[np.ndarray, "4 4"], x_m: float, y_m: float) -> Float[np.ndarray, "4 4"]:
-    """The pose with its origin above (x, y)."""
+    """The pose with its origin at (x, y), height and rotation kept."""
     out = pose.copy()
     out[:2, 3] = x_m, y_m
     return out

@@ -1,4 +1,4 @@
-"""``make doctor``: what is present, what is missing, how to mend it, in plain words."""
+"""``make doctor``: what is installed, what is missing, and how to install it."""
 
 import importlib.metadata
 import os
@@ -28,7 +28,7 @@ TRIAL_TIMEOUT_S = 120  # a first picture compiles shaders; a driver that hangs t
 
 @dataclass(frozen=True)
 class Finding:
-    """One line of the report; ``remedy`` is empty when all is well."""
+    """One line of the report; ``remedy`` is empty where nothing is missing."""
 
     subject: str
     state: str
@@ -36,7 +36,7 @@ class Finding:
 
 
 def check_python() -> Finding:
-    """The interpreter's version."""
+    """Check the version of Python."""
     state = f"{platform.python_version()} at {sys.executable}"
     if sys.version_info[:2] < OLDEST_PYTHON:
         return Finding("Python", state, "install Python 3.11 or newer: apt-get install python3")
@@ -44,7 +44,7 @@ def check_python() -> Finding:
 
 
 def check_tools() -> Finding:
-    """Make, and the compiler that some wheels may need."""
+    """Check for make, and for the C compiler that some packages need."""
     missing = [tool for tool in ("make", "cc") if shutil.which(tool) is None]
     if missing:
         return Finding("tools", f"missing: {', '.join(missing)}", "apt-get install build-essential")
@@ -52,7 +52,7 @@ def check_tools() -> Finding:
 
 
 def check_readers() -> Finding:
-    """Readers of MCAP in other languages, by which the tests check artifacts."""
+    """Check for the MCAP readers of other languages that tests use."""
     missing = []
     if shutil.which("node") is None or shutil.which("npm") is None:
         missing.append("apt-get install nodejs npm, then 'make reader'")
@@ -65,7 +65,7 @@ def check_readers() -> Finding:
 
 
 def check_venv() -> Finding:
-    """The virtual environment and its pins."""
+    """Check that the virtual environment has the pinned packages."""
     if not (ROOT / ".venv/.ready").is_file():
         return Finding("packages", "the virtual environment is not set up", "run 'make setup'")
     wrong = [
@@ -79,7 +79,7 @@ def check_venv() -> Finding:
 
 
 def check_driver() -> Finding:
-    """The Vulkan driver SAPIEN renders with."""
+    """Check for the Vulkan driver that SAPIEN renders with."""
     if vulkan_driver.has_gpu():
         return Finding("Vulkan driver", "an NVIDIA GPU")
     version = vulkan_driver.mesa_version()
@@ -95,7 +95,7 @@ def check_driver() -> Finding:
 
 
 def check_rendering() -> Finding:
-    """Whether SAPIEN really renders, tried in a process of its own."""
+    """Check that SAPIEN renders, in a process of its own."""
     try:
         trial = subprocess.run(
             [sys.executable, "-c", RENDER_TRIAL],
@@ -114,7 +114,7 @@ def check_rendering() -> Finding:
 
 
 def check_room() -> Finding:
-    """Cores, and disk for a run."""
+    """Check the number of cores and the free disk space."""
     free_gib = shutil.disk_usage(ROOT).free / 2**30
     state = f"{len(os.sched_getaffinity(0))} cores, {free_gib:.0f} GiB of disk free"
     short = free_gib < FREE_GIB_WANTED
@@ -133,7 +133,7 @@ CHECKS: tuple[Callable[[], Finding], ...] = (
 
 
 def main() -> int:
-    """Print every finding; non-zero if something is to be mended."""
+    """Print every finding; the exit status is 1 if something is missing."""
     findings = [check() for check in CHECKS]
     for finding in findings:
         mark = "needs care" if finding.remedy else "well"

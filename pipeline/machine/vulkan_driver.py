@@ -111,12 +111,12 @@ def install() -> bool:
 
 
 def may_install() -> bool:
-    """Whether this user can install packages without being asked anything."""
+    """Whether this user is root on a machine with apt-get."""
     return os.geteuid() == 0 and shutil.which("apt-get") is not None
 
 
 def advice() -> str:
-    """The exact commands for a person with sudo."""
+    """The commands that a user with sudo has to run."""
     lines = []
     source = backports_source()
     if source is not None:

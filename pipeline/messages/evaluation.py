@@ -15,7 +15,27 @@ PICTURE_EVERY = 4  # pixels a side: a film needs to show what was seen, not to m
 def attempt_message(
     scene_id: str, level: int, bodies: int, number: int, policy: str, made: JudgedAttempt
 ) -> evaluation_pb2.Attempt:
-    """The message of one attempt. bodies : of the scene, when it was whole."""
+    """Write one attempt as a message.
+
+    Parameters
+    ----------
+    scene_id
+        The scene.
+    level
+        Its level, 1 to 9.
+    bodies
+        Number of bodies in the scene before the first attempt.
+    number
+        Number of the attempt in its scene, from 0.
+    policy
+        Name of the policy.
+    made
+        The attempt.
+
+    Returns
+    -------
+    The message.
+    """
     lifted = made.cause is Cause.LIFTED
     decision, samples = made.decision, made.samples
     gone = np.full((4, 4), np.nan)
@@ -56,7 +76,7 @@ def attempt_message(
 
 
 def picture_message(picture: DepthPicture) -> evaluation_pb2.DepthPicture:
-    """A thinned depth image."""
+    """Write a depth picture as a message, with one pixel of `PICTURE_EVERY` on each side."""
     depth = np.nan_to_num(picture.depth_m[::PICTURE_EVERY, ::PICTURE_EVERY])
     camera = thinned(picture.camera, PICTURE_EVERY)
     return evaluation_pb2.DepthPicture(

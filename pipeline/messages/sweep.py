@@ -58,7 +58,7 @@ def mark_networks(networks: list[SweepNetwork], of_run: NetworkConfig) -> None:
 
 
 def network_config_of(network: SweepNetwork) -> NetworkConfig:
-    """The make of a network of the sweep."""
+    """Configuration of a network of the sweep."""
     attention = "none" if network.variant == "no attention" else "cbam"
     channels = tuple(network.channels)
     return NetworkConfig.model_validate(
@@ -67,7 +67,7 @@ def network_config_of(network: SweepNetwork) -> NetworkConfig:
 
 
 def budget_message(config: RunConfig, given: dict[str, Samples]) -> SweepBudget:
-    """What every member was given: split to samples."""
+    """What every network was given: samples by split, epochs, batch size; and the error to beat."""
     return SweepBudget(
         train_samples=len(given["train"]),
         val_samples=len(given["val"]),
@@ -104,7 +104,7 @@ def sweep_summary(
 
 
 def plain_values(message: SweepNetwork | SweepBudget) -> dict[str, Any]:
-    """A message's values by name, those at their default too; curves stay in the artifact."""
+    """Values of a message by field name, default values included; curves are left out."""
     fields = MessageToDict(
         message, preserving_proto_field_name=True, always_print_fields_with_no_presence=True
     )

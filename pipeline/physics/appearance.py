@@ -18,7 +18,7 @@ _CREASE_COSINE = float(np.cos(np.radians(35.0)))
 
 
 def body_colour(body_id: int) -> tuple[float, float, float]:
-    """A colour for each body id, neighbours in number far apart in hue; linear RGB in [0, 1]."""
+    """Colour of a body by its id, linear RGB in [0, 1]; successive ids differ clearly in hue."""
     hue = (0.02 + body_id * _GOLDEN_RATIO) % 1.0
     lightness = (0.46, 0.34, 0.56)[body_id % 3]
     saturation = (0.75, 0.65, 0.60)[body_id % 3]

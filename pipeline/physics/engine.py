@@ -61,9 +61,17 @@ class Body:
 
 
 def roll_freely(body: Body, free: bool) -> None:
-    """Take the stand-in for rolling resistance off a body that is carried, or put it back.
+    """Switch a body's damping off while it is carried, or on again.
 
-    In the air it would be a drag, felt as a load that no object has.
+    The damping stands in for rolling resistance. In the air it would be a drag, felt as a load that
+    no real object has.
+
+    Parameters
+    ----------
+    body
+        The body.
+    free
+        Whether the damping is off.
     """
     damping = 0.0 if free else _ROLLING_DAMPING_1_S
     body.rigid.linear_damping = damping
@@ -71,9 +79,23 @@ def roll_freely(body: Body, free: bool) -> None:
 
 
 def new_world(config: ScenesConfig, render: bool) -> sapien.Scene:
-    """An empty table under gravity; with lights and visuals where `render` is set.
+    """Make a world with an empty table under gravity.
 
-    Raises MachineError where `render` is set and no Vulkan driver can render.
+    Parameters
+    ----------
+    config
+        Section scenes: table and time step.
+    render
+        Whether the world has lights and visible shapes.
+
+    Returns
+    -------
+    The world.
+
+    Raises
+    ------
+    MachineError
+        ``render`` is set and no Vulkan driver can render.
     """
     sapien.physx.set_scene_config(
         gravity=np.array(_GRAVITY_M_S2),
@@ -109,10 +131,29 @@ def add_body(
     colour: tuple[float, float, float],
     config: ScenesConfig,
 ) -> Body:
-    """Put one object into the world, at rest at the given pose.
+    """Add an object to the world, at rest.
 
-    Collides by its convex parts, has the catalogue's mass and inertia, and shows its true mesh in
-    `colour` (linear RGB in [0, 1]) where the world renders. body_id: 1-based, unique in the world.
+    It collides by its convex parts, has the catalogue's mass and inertia, and shows its true mesh
+    where the world renders.
+
+    Parameters
+    ----------
+    world
+        The world.
+    catalogue_object
+        The object.
+    world_from_object
+        Its pose, shape (4, 4).
+    body_id
+        Segmentation id, from 1, unique in the world.
+    colour
+        Linear RGB in [0, 1].
+    config
+        Section scenes: friction.
+
+    Returns
+    -------
+    The body.
     """
     if body_id < 1:
         raise ValueError(f"body ids start at 1, got {body_id}")

@@ -1,6 +1,6 @@
-"""What would render on this machine, tried without a picture: ``python -m`` prints it as JSON.
+"""Which renderer works on this machine: ``python -m pipeline.physics.render_trial`` prints JSON.
 
-A process of its own, as graphics drivers leave threads and settings behind.
+It runs in a process of its own because graphics drivers leave threads and settings behind.
 """
 
 import json
@@ -16,7 +16,7 @@ DIGEST_LENGTH = 12  # hexadecimal digits that tell two drivers apart
 
 
 def try_renderer() -> str:
-    """SAPIEN with its device and the driver files behind it; empty where it cannot render."""
+    """Name SAPIEN's version, device and driver files; empty where SAPIEN cannot render."""
     try:
         system = new_render_system()
     except MachineError:
@@ -43,7 +43,7 @@ def loaded_drivers() -> list[Path]:
 
 
 def main() -> None:
-    """Print what was found, and the files and folders that it depends on."""
+    """Print the renderer, and the files and folders that the answer depends on."""
     renderer = try_renderer()
     watched = [str(path) for path in (*MANIFEST_FOLDERS, *manifests(), *loaded_drivers())]
     sys.stdout.write(json.dumps({"renderer": renderer, "watched": watched}))

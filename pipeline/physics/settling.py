@@ -1,4 +1,4 @@
-"""Until everything rests: physics runs until speeds stay low, never for a fixed count."""
+"""Run physics until all bodies are at rest."""
 
 from collections.abc import Sequence
 
@@ -10,17 +10,17 @@ from pipeline.physics.engine import Body
 
 
 def settle(world: sapien.Scene, bodies: Sequence[Body], config: ScenesConfig) -> float:
-    """Step the world until every body has been at rest for a while; simulated time taken [s].
+    """Step the world until every body has been at rest for a while.
 
-    At rest: linear speed under ``settle_linear_m_s`` and rate under ``settle_angular_rad_s``
-    throughout ``settle_hold_s``.
+    At rest means: linear speed below ``settle_linear_m_s`` and angular speed below
+    ``settle_angular_rad_s`` throughout ``settle_hold_s``, or put to sleep by PhysX.
 
     Parameters
     ----------
     world
         PhysX scene.
     bodies
-        All bodies that must come to rest.
+        Bodies that must come to rest.
     config
         Section scenes: what counts as rest, and how long to wait.
 
@@ -31,7 +31,7 @@ def settle(world: sapien.Scene, bodies: Sequence[Body], config: ScenesConfig) ->
     Raises
     ------
     SceneError
-        Still moving after ``settle_max_s``, or a body left the table.
+        A body still moves after ``settle_max_s``.
     """
     resting_s = elapsed_s = 0.0
     while resting_s < config.settle_hold_s:

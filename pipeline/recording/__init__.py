@@ -1,1 +1,1 @@
-"""Rerun: what each stage shows, and its blueprint."""
+"""Rerun recordings: what each stage shows, and how the viewer lays it out."""

@@ -1,6 +1,6 @@
-"""evaluate.rrd: a film of the attempts, worst failure first: scene, robot, what was seen, felt.
+"""evaluate.rrd: a film of the attempts with scene, robot, pictures and forces, worst failure first.
 
-The worst failure is the one that promised most: the highest q-hat among those that did not lift.
+The worst failure is the failed attempt with the highest q-hat.
 """
 
 from collections.abc import Mapping, Sequence
@@ -73,7 +73,7 @@ def draw_evaluate(stage: FinishedStage, figures: Mapping[str, Any]) -> None:
 
 
 def shown_robot(config: RunConfig) -> ShownRobot:
-    """What the film shows of the robot beside its poses."""
+    """Sizes of the robot that the film shows."""
     return ShownRobot(config.gripper.pad.radius_m, config.evaluate.hand, config.evaluate.arm)
 
 
@@ -131,7 +131,23 @@ def show_attempts(
     table: str,
     robot: ShownRobot,
 ) -> None:
-    """Film the attempts in their order; ``names`` are each scene's objects by body id."""
+    """Log the attempts one after the other as a film.
+
+    Parameters
+    ----------
+    stream
+        The recording.
+    attempts
+        Attempts in the order of the film.
+    names
+        Names of each scene's objects, in the order of their body ids, by scene id.
+    meshes
+        Mesh of each object by its name.
+    table
+        The results as Markdown.
+    robot
+        Sizes of the robot.
+    """
     stream.log(
         "notes/result", rr.TextDocument(table, media_type=rr.MediaType.MARKDOWN), static=True
     )

@@ -60,11 +60,17 @@ class ShownGrasp:
     Attributes
     ----------
     placed
-        The objects of its scene.
+        Objects of its scene.
+    origin
+        Scene and camera that the grasp comes from.
+    grasps
+        The batch of labelled grasps that holds it.
+    row
+        Its row in the batch.
     pad_height_m
-        Draped pad, z in GCS at first touch.
+        Height of the draped pad's vertices, z in GCS at first touch [m], shape (v,).
     pad_pressure
-        p w_j of each triangle, as in `triangle_pressure`.
+        p w_j of each triangle, as in `triangle_pressure`, shape (t,).
     """
 
     placed: Sequence[PlacedObject]

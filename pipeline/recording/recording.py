@@ -53,7 +53,7 @@ TIMELINES = {
 
 
 class Recorded(Protocol):
-    """What a recording is told about the stage that it shows."""
+    """The part of a stage that its recording needs."""
 
     @property
     def name(self) -> str:
@@ -61,19 +61,19 @@ class Recorded(Protocol):
 
     @property
     def recording(self) -> Path:
-        """Where the recording appears."""
+        """Path of the .rrd file."""
 
     @property
     def recording_id(self) -> str:
-        """The stage's key, so that equal runs open as the same recording."""
+        """Key of the stage: the viewer opens recordings of equal runs as the same recording."""
 
     @property
     def drawing(self) -> Stopwatch:
-        """Counts the processor time that recording takes."""
+        """Counts the processor time spent on recording."""
 
 
 class FinishedStage(Recorded, Protocol):
-    """A stage whose artifact is finished: what its recording is drawn from."""
+    """A stage whose artifact is finished; its recording is drawn from the artifact."""
 
     @property
     def config(self) -> RunConfig:
@@ -81,10 +81,10 @@ class FinishedStage(Recorded, Protocol):
 
     @property
     def output(self) -> Path:
-        """The stage's artifact."""
+        """Path of the stage's artifact."""
 
     def upstream(self, stage: str) -> Path:
-        """The artifact of a stage that this one reads."""
+        """Path of the artifact of another stage that this stage reads."""
 
 
 @contextmanager
@@ -124,7 +124,7 @@ def recording(stage: Recorded, blueprint: rrb.Blueprint) -> Iterator[rr.Recordin
 
 
 def _warn_if_large(path: Path) -> None:
-    """A recording over `LARGEST_MB` is slow to open."""
+    """Warn where a recording is larger than `LARGEST_MB`, as it is slow to open."""
     megabytes = path.stat().st_size / 1e6
     if megabytes > LARGEST_MB:
         advice = "{} has {:.0f} MB, which is slow to open: lower the numbers in [recording]"
@@ -133,7 +133,7 @@ def _warn_if_large(path: Path) -> None:
 
 @contextmanager
 def _explaining_a_full_disk(path: Path) -> Iterator[None]:
-    """Rerun's writer stops at a full disk and says only that it stopped: say why."""
+    """Raise OSError where Rerun's writer stopped at a full disk; Rerun itself gives no reason."""
     try:
         yield
     except RuntimeError:
@@ -142,7 +142,7 @@ def _explaining_a_full_disk(path: Path) -> Iterator[None]:
 
 
 def _check_room(path: Path) -> None:
-    """Raise OSError on a full disk: Rerun would wait there for its writer, and for ever."""
+    """Raise OSError on a full disk: Rerun's writer would wait for ever."""
     if shutil.disk_usage(path.parent).free < NO_ROOM_BYTES:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
 
@@ -150,31 +150,45 @@ def _check_room(path: Path) -> None:
 def eye_at(
     from_m: tuple[float, float, float], at_m: tuple[float, float, float]
 ) -> rrb.EyeControls3D:
-    """Where a 3-D view's eye stands and what it looks at, z up."""
+    """A 3-D view's camera at one point [m] that looks at another [m]; z is up."""
     return rrb.EyeControls3D(position=from_m, look_target=at_m, eye_up=(0.0, 0.0, 1.0))
 
 
 def time_panel(timeline: str) -> rrb.TimePanel:
-    """The collapsed time panel, standing still on the recording's one timeline."""
+    """The time panel, collapsed and paused, on the recording's one timeline."""
     return rrb.TimePanel(timeline=timeline, state="collapsed", play_state="paused")
 
 
 def name_curve(
     stream: rr.RecordingStream, path: str, name: str, colour: UInt8[np.ndarray, " 3"]
 ) -> None:
-    """Name and colour of the curve logged under ``path``."""
+    """Set name and colour of the curve logged under ``path``."""
     stream.log(path, rr.SeriesLines(names=name, colors=colour, widths=1.5), static=True)
 
 
 def set_step(stream: rr.RecordingStream, timeline: str, index: int) -> None:
-    """Move to step ``index`` of the recording's one timeline."""
+    """Log what follows at step ``index`` of the recording's one timeline."""
     stream.set_time(timeline, sequence=index)
 
 
 def start_path(stream: rr.RecordingStream, path: str, number: int) -> str:
-    """Path of what is shown at step ``number`` alone; what the step before showed there goes.
+    """Clear what the step before showed under a path, and return the path for this step.
 
-    Each step has a path of its own, as a clearing and a logging of one path at one time race.
+    Each step logs under a path of its own: clearing and logging the same path at the same time has
+    no defined order.
+
+    Parameters
+    ----------
+    stream
+        The recording, already at this step.
+    path
+        Path without the number.
+    number
+        Number of the step, from 0.
+
+    Returns
+    -------
+    Path under which this step logs.
     """
     if number > 0:
         stream.log(f"{path}/{number - 1:04d}", rr.Clear(recursive=True))

@@ -32,8 +32,22 @@ VIEW = "Pad by the vacuum under it (dark 0, yellow a closed fan's), load borne a
 class ShownSeal:
     """One grasp of the recording.
 
-    meshes : the target's first, and their poses in GCS. seal : None where nothing is met.
-    down : of the world, in GCS.
+    Attributes
+    ----------
+    meshes
+        Mesh and gripper_from_object of the target, then of the objects near it.
+    seal
+        The referee's seal; None where the pad meets nothing.
+    down
+        Direction of gravity in GCS, shape (3,).
+    borne_n
+        Greatest weight at the object's centre of mass that the seal bears [N].
+    weight_n
+        Weight of the object [N].
+    title
+        Name of the object.
+    scores
+        Name of a score and its value for this grasp.
     """
 
     meshes: Sequence[tuple[Mesh, Float[np.ndarray, "4 4"]]]
@@ -54,7 +68,29 @@ def shown_seal(
     borne_n: float,
     scores: Mapping[str, float],
 ) -> ShownSeal:
-    """A grasp of a scene, with what of the scene is near it."""
+    """Collect what the recording shows of one grasp.
+
+    Parameters
+    ----------
+    items
+        Objects of the scene.
+    world_from_objects
+        Pose of each, shape (4, 4).
+    target
+        Index of the object that is grasped.
+    world_from_gripper
+        Pose of the gripper, shape (4, 4).
+    seal
+        The referee's seal; None where the pad meets nothing.
+    borne_n
+        Greatest weight that the seal bears [N].
+    scores
+        Name of a score and its value for this grasp.
+
+    Returns
+    -------
+    The grasp with the objects near it.
+    """
     gripper_from_world = invert(world_from_gripper)
     meshes = [
         (item.mesh, gripper_from_world @ pose)

@@ -1,4 +1,4 @@
-"""The verdict of an evaluation as a person reads it: Markdown."""
+"""The results of an evaluation as Markdown tables."""
 
 from collections.abc import Sequence
 
@@ -10,7 +10,21 @@ def results_markdown(
     policies: Sequence[LevelResult],
     comparisons: Sequence[Comparison],
 ) -> str:
-    """A table of each policy by level, then the policies over all levels, side by side."""
+    """Write the results as Markdown: each policy by level, then all policies over all levels.
+
+    Parameters
+    ----------
+    levels
+        Result of each policy at each level.
+    policies
+        Result of each policy over all levels.
+    comparisons
+        The first policy against each other one.
+
+    Returns
+    -------
+    Markdown.
+    """
     parts = [_policy_table(p.policy, [r for r in levels if r.policy == p.policy]) for p in policies]
     rows = "\n".join(
         f"| {p.policy} | {_rate(p)} | {p.lifted} / {p.objects} | {p.cleared} / {p.clutters} "

@@ -1,4 +1,4 @@
-"""What moves the pad, as the film shows it: the gripper, and an arm's links where there is one."""
+"""The moving robot in a recording: the gripper, and the links of an arm where there is one."""
 
 from dataclasses import dataclass
 
@@ -16,7 +16,7 @@ _PAD_M = 0.004  # the pad is drawn this thick
 
 @dataclass(frozen=True)
 class ShownRobot:
-    """Its sizes, and where an arm's foot stands."""
+    """Sizes of gripper and hand, and the arm's configuration with the position of its foot."""
 
     pad_radius_m: float
     hand: HandConfig
@@ -24,7 +24,7 @@ class ShownRobot:
 
 
 def show_gripper(stream: rr.RecordingStream, robot: ShownRobot) -> None:
-    """Pad and stem, in GCS; their pose is logged frame by frame."""
+    """Log the shapes of pad and stem in GCS; their pose is logged for each frame elsewhere."""
     hand = robot.hand
     stem_m = hand.length_m - hand.stem_begins_m
     stream.log(
@@ -51,7 +51,7 @@ def show_gripper(stream: rr.RecordingStream, robot: ShownRobot) -> None:
 
 
 def show_arm(stream: rr.RecordingStream) -> None:
-    """Foot and links, each in its own frame; their poses are logged frame by frame."""
+    """Log the shapes of the arm's links, each in its own frame; poses are logged elsewhere."""
     for shape in LINKS:
         stream.log(f"{ARM}/{shape.link}", _shown(shape), static=True)
 
@@ -63,7 +63,21 @@ def send_arm(
     joint_path_rad: Float[np.ndarray, "t 7"],
     robot: ShownRobot,
 ) -> None:
-    """The links' poses at each of some frames of the film."""
+    """Log the poses of the arm's links over time.
+
+    Parameters
+    ----------
+    stream
+        The recording.
+    timeline
+        Name of its timeline.
+    frames
+        Steps of the timeline, shape (t,).
+    joint_path_rad
+        Joint angles at these steps [rad], shape (t, 7).
+    robot
+        The robot that is shown.
+    """
     poses = link_poses(joint_path_rad)
     poses[..., :3, 3] += robot.arm.base_m
     for index, shape in enumerate(LINKS):
@@ -77,7 +91,21 @@ def send_poses(
     frames: Int[np.ndarray, " t"],
     poses: Float[np.ndarray, "t 4 4"],
 ) -> None:
-    """A frame's pose at each of some frames of the film."""
+    """Log the pose of one entity over time.
+
+    Parameters
+    ----------
+    stream
+        The recording.
+    timeline
+        Name of its timeline.
+    entity
+        Path of the entity.
+    frames
+        Steps of the timeline, shape (t,).
+    poses
+        world_from_entity at these steps, shape (t, 4, 4).
+    """
     if len(frames):
         columns = rr.Transform3D.columns(translation=poses[:, :3, 3], mat3x3=poses[:, :3, :3])
         indexes = [rr.TimeColumn(timeline, sequence=frames)]

@@ -18,16 +18,28 @@ CREASE_RAD = 0.6  # sharper edges stay edges when a mesh is shaded
 
 
 def shown_mesh(mesh: Mesh, colour: UInt8[np.ndarray, " 3"]) -> rr.Mesh3D:
-    """A closed mesh in one colour, smooth but for its edges, about ``TOLERANCE_M`` off at most.
+    """A closed mesh in one colour for Rerun: simplified, shaded smooth except at sharp edges.
 
-    One that keeps more than ``MOST_FACES`` faces so is given more tolerance.
+    The simplified surface differs by about ``TOLERANCE_M``, or by more where the mesh would
+    otherwise keep more than ``MOST_FACES`` faces.
+
+    Parameters
+    ----------
+    mesh
+        A closed mesh.
+    colour
+        Red, green and blue, shape (3,).
+
+    Returns
+    -------
+    The mesh as Rerun logs it.
     """
     return _ready(mesh, (*colour.tolist(), 255))
 
 
 @lru_cache(maxsize=256)
 def _ready(mesh: Mesh, rgba: tuple[int, ...]) -> rr.Mesh3D:
-    """Made once, however often it is logged."""
+    """Build a mesh for Rerun once and keep it, as it is logged many times."""
     shown = shaded(mesh)
     return rr.Mesh3D(
         vertex_positions=shown.vertices_m,
@@ -51,7 +63,7 @@ def shown_facets(mesh: Mesh, colour: UInt8[np.ndarray, " 3"]) -> rr.Mesh3D:
 
 @dataclass(frozen=True, eq=False)
 class Shaded:
-    """A mesh and its normals, one a vertex; the vertices of its sharp edges are doubled."""
+    """A mesh with one normal for each vertex; vertices on sharp edges appear once for each side."""
 
     vertices_m: Float[np.ndarray, "n 3"]
     faces: Int[np.ndarray, "m 3"]
@@ -60,7 +72,7 @@ class Shaded:
 
 @lru_cache(maxsize=256)
 def shaded(mesh: Mesh) -> Shaded:
-    """A closed mesh, simplified but where it is small, smooth but for its edges."""
+    """Simplify a closed mesh, unless it is small, and give it normals: smooth except at edges."""
     solid = to_manifold(mesh) if len(mesh.faces) <= FEW_FACES else _simplified(mesh)
     arrays = solid.calculate_normals(0, float(np.degrees(CREASE_RAD))).to_mesh64()
     vertices = np.array(arrays.vert_properties, dtype=np.float64)

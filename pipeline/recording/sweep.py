@@ -1,4 +1,4 @@
-"""sweep.rrd: error and time against depth, a curve a channel set, and what each part buys."""
+"""sweep.rrd: error and time by depth for each channel set, and the effect of each part."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -98,12 +98,12 @@ def show_sweep(
 
 
 def channels_name(network: SweepNetwork) -> str:
-    """Such as ``64-128-256-512``."""
+    """Name of a channel set, such as ``64-128-256-512``."""
     return "-".join(map(str, network.channels))
 
 
 def describe_budget(budget: SweepBudget) -> str:
-    """What every network was given, in a sentence."""
+    """One sentence on the samples and epochs that every network was given."""
     return (
         f"{budget.train_samples} training samples, {budget.epochs} epochs, batches of "
         f"{budget.batch_size}; {budget.test_samples} test samples, of which the mean predictor "
@@ -112,7 +112,7 @@ def describe_budget(budget: SweepBudget) -> str:
 
 
 def family_table(family: Sequence[tuple[SweepNetwork, float]]) -> str:
-    """One row a network; the chosen one in bold."""
+    """Markdown table with a row for each network; the chosen one is bold."""
     rows = []
     for network, time_ms in family:
         bold = "**" if network.chosen else ""

@@ -1,4 +1,4 @@
-"""The Rerun viewer without a screen: a recording opened, checked and photographed."""
+"""The Rerun viewer without a window: open a recording, list its problems, save pictures of it."""
 
 import os
 import signal
@@ -29,16 +29,18 @@ _TRIES = 3  # beyond the first; the viewer gives up on a picture after some seco
 
 @dataclass(frozen=True)
 class ViewerState:
-    """What a person sees who opens a recording.
+    """What the viewer shows of a recording.
 
     Attributes
     ----------
-    window_png, view_png
-        The whole window, and each view by its name, those behind tabs left out.
+    window_png
+        Picture of the whole window.
+    view_png
+        Picture of each visible view by its name; views behind a tab are left out.
     problems
         What the viewer could not show, and why.
     timeline
-        The timeline it opens on.
+        Name of the timeline that is active.
     """
 
     window_png: bytes
@@ -48,23 +50,23 @@ class ViewerState:
 
 
 def photograph(recording: Path, step: int | None = None) -> ViewerState:
-    """Open ``recording`` in the viewer, off screen, and look once it stands still.
+    """Open a recording in the viewer, without a window, and take pictures once it is loaded.
 
     Parameters
     ----------
     recording
         An .rrd file.
     step
-        Where on its timeline; None is where it opens by itself.
+        Step of its timeline; None for the step at which it opens.
 
     Returns
     -------
-    What the viewer shows, and its state.
+    The pictures, and the problems that the viewer reports.
 
     Raises
     ------
     MachineError
-        The viewer does not start, as without any graphics driver.
+        The viewer does not start, for example without a graphics driver.
     SoftgripError
         The recording does not finish loading.
     """
@@ -88,9 +90,17 @@ def photograph(recording: Path, step: int | None = None) -> ViewerState:
 
 @contextmanager
 def off_screen_viewer() -> Iterator[ViewerClient]:
-    """A viewer without a window, ready to be driven; ended with the block.
+    """Start a viewer without a window, and end it with the block.
 
-    Raises MachineError where it does not start, as without any graphics driver.
+    Yields
+    ------
+    ViewerClient
+        The connected client.
+
+    Raises
+    ------
+    MachineError
+        The viewer does not start, for example without a graphics driver.
     """
     choose_vulkan_driver()
     port = _free_port()
@@ -111,7 +121,7 @@ def off_screen_viewer() -> Iterator[ViewerClient]:
 
 
 def _viewer_command(port: int) -> list[str]:
-    """The viewer's command line: no window, and heard by this machine alone."""
+    """Command line of a viewer without a window that listens on this machine only."""
     viewer = str(Path(sys.executable).with_name("rerun"))
     options = ["--headless", "--hide-welcome-screen", "--renderer", "vulkan"]
     return [viewer, *options, "--bind", LOCAL, "--port", str(port)]
@@ -153,7 +163,7 @@ def _connected(process: subprocess.Popen[bytes], port: int) -> ViewerClient:
 
 
 def _settled(client: ViewerClient, recording: Path) -> bytes:
-    """The window once nothing loads and two looks in a row are the same."""
+    """Picture of the window once nothing loads and two pictures in a row are equal."""
     before, deadline = b"", time.monotonic() + _PATIENCE_S
     while time.monotonic() < deadline:
         time.sleep(_PAUSE_S)
@@ -170,7 +180,7 @@ def _settled(client: ViewerClient, recording: Path) -> bytes:
 
 @contextmanager
 def _behind_a_tab() -> Iterator[None]:
-    """A view behind another one's tab is called visible, and cannot be photographed."""
+    """Ignore the error for a view behind a tab: the viewer calls it visible but has no picture."""
     try:
         yield
     except ConnectionError as error:

@@ -1,4 +1,4 @@
-"""Figures against figures: every quantity has a name that a person reads, and what it may move."""
+"""Compare a run's figures with a reference: each quantity has a name and a tolerance."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,23 +10,25 @@ Figures = dict[str, dict[str, Value]]
 
 @dataclass(frozen=True)
 class Rule:
-    """How the quantities of a group are called and how far one may move.
+    """Name and tolerance of the quantities of a group.
 
     Attributes
     ----------
     name
-        Of one quantity, its item in place of ``{}``.
+        Name of a quantity; ``{}`` stands for the item.
     unit
-        Behind its value, where it has one.
-    absolute, relative
-        The larger of both is allowed; none of both means equal.
+        Unit written after the value.
+    absolute
+        Greatest allowed difference.
+    relative
+        Greatest allowed difference as a share of the reference's value. The larger of ``absolute``
+        and this one counts; where both are 0, values must be equal.
     between
-        Groups of the reference that hold the least and the greatest value allowed, item by
-        item.
+        Groups of the reference that hold the least and the greatest allowed value of each item.
     each_in_run
         Whether every item of the reference must be in the run.
     compared
-        Whether the group is compared at all: bounds are not.
+        Whether the group is compared; groups that hold bounds are not.
     """
 
     name: str
@@ -75,7 +77,7 @@ RULES = {
 
 @dataclass(frozen=True)
 class Difference:
-    """One quantity that is not as the reference has it."""
+    """A quantity that differs from the reference by more than its tolerance."""
 
     quantity: str
     before: str

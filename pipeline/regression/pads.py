@@ -1,4 +1,4 @@
-"""A fixed small shard of pads over surfaces, whose labels no renderer and no physics decide."""
+"""A small fixed file of pads over surfaces; their labels depend on no renderer and no physics."""
 
 from pathlib import Path
 
@@ -19,14 +19,28 @@ def write_pads(
     heights_m: Float[np.ndarray, "n v"],
     on_target: Bool[np.ndarray, "n v"],
 ) -> None:
-    """Keep what lies under each vertex of each pad; single precision is exact to 1e-9 m here."""
+    """Write the heights under each pad's vertices to a file.
+
+    Single precision is exact to 1e-9 m for such heights.
+
+    Parameters
+    ----------
+    path
+        The file.
+    provenance
+        What the file is made from.
+    heights_m
+        Height of the surface under each vertex, z in GCS [m], shape (n, v).
+    on_target
+        Vertices over the target object, shape (n, v).
+    """
     with ArtifactWriter(path, provenance) as artifact:
         artifact.write(HEIGHTS, to_tensor(heights_m.astype(np.float32)), log_time_ns=0)
         artifact.write(ON_TARGET, to_tensor(on_target.astype(np.uint8)), log_time_ns=0)
 
 
 def labelled_pads(path: Path, config: GripperConfig) -> LabelBatch:
-    """S-1.07 - S-1.12 on every pad of the shard, with Table I's pad."""
+    """Label every pad of the file (S-1.07 - S-1.12) with the configuration given."""
     with open_artifact(path) as artifact:
         (heights,) = (from_tensor(m) for _, m in artifact.messages(Tensor, HEIGHTS))
         (target,) = (from_tensor(m) for _, m in artifact.messages(Tensor, ON_TARGET))

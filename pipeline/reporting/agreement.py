@@ -1,4 +1,4 @@
-"""What `make referee` found, as a person and a spreadsheet read it."""
+"""The results of `make referee` as CSV and as Markdown."""
 
 import csv
 import io
@@ -9,7 +9,7 @@ import numpy as np
 
 
 def as_csv(columns: Mapping[str, np.ndarray]) -> str:
-    """A column a name, a line a grasp."""
+    """Write the columns as CSV, a row for each grasp."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)

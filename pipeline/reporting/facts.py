@@ -1,4 +1,4 @@
-"""What a run says of itself: provenance, summaries and the few artifacts a report reads."""
+"""Facts of a run for its report, from provenance, summaries and a few artifacts."""
 
 import json
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What a report says of a run in words: its headline, its meshes, what does not fit together."""
+"""Sentences of a report: its headline, its meshes, and parts that do not belong together."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -31,7 +31,7 @@ def headline(summaries: dict[str, dict[str, Any] | None]) -> str:
 def mixed_parts(
     folder: RunFolder, provenance: list[Provenance], stages: Iterable[str]
 ) -> list[str]:
-    """What was made from another state of an artifact than the one that lies there now."""
+    """Name the parts that were made from another version of an artifact than the present one."""
     there = {path.name: path for path in map(folder.artifact, stages) if path.is_file()}
     now = content_digests(there, folder.state("hashes.json"))
     return [

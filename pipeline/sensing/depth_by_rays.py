@@ -1,7 +1,7 @@
-"""What a depth camera measures of bodies that move: rays through its pixels, then its noise.
+"""What a depth camera measures of moving bodies: a ray through each pixel, then the sensor's noise.
 
-Without colour, and exact like `ray_rendering`, but for bodies posed anew at every look: this is
-the camera of the closed loop, where a look must cost milliseconds.
+It gives the same exact depth as `ray_rendering`, but no colour, and the bodies may have new poses
+at every picture. It is the camera of the closed loop, where a picture must take milliseconds.
 """
 
 from dataclasses import replace
@@ -23,12 +23,23 @@ def measure_depth(
     opaque: Surfaces | None,
     rng: np.random.Generator | None,
 ) -> tuple[Float[np.ndarray, "h w"], Integer[np.ndarray, "h w"]]:
-    """The depth image, 0 where nothing is measured, and the body that each pixel shows.
+    """Take a depth picture, and tell which body each pixel shows.
 
-    Bodies are told by their ids, transparent or not; 0 is the table and nothing.
+    Parameters
+    ----------
+    camera
+        Where the picture is taken from.
+    scene
+        Surfaces of all bodies.
+    opaque
+        Surfaces of the opaque bodies only; None where no body is transparent.
+    rng
+        Draws the sensor's noise; None for an exact picture.
 
-    opaque : what stands behind transparent bodies; None where there are none.
-    rng : of the sensor's noise; None for an exact image.
+    Returns
+    -------
+    Depth along the camera's z [m], 0 where nothing is measured; and the id of the body at each
+    pixel, 0 for the table or nothing; both of shape (h, w).
     """
     view = _exact(camera, scene)
     if opaque is not None:
@@ -39,9 +50,21 @@ def measure_depth(
 def window_around(
     camera: PinholeCamera, point_m: Float[np.ndarray, " 3"], radius_m: float
 ) -> PinholeCamera:
-    """The camera with its picture cut to the square that a sphere around a point falls into.
+    """Cut the camera's picture to the part that shows a sphere.
 
-    What lies outside the picture is cut off; at least one pixel remains.
+    Parameters
+    ----------
+    camera
+        Camera of the whole picture.
+    point_m
+        Centre of the sphere in WCS [m], shape (3,).
+    radius_m
+        Radius of the sphere [m].
+
+    Returns
+    -------
+    Camera of that part: a square around the sphere's picture, cut at the borders of the whole
+    picture, with at least one pixel.
     """
     k = camera.intrinsics
     x, y, z = transform_points(invert(camera.world_from_camera), point_m)
@@ -83,9 +106,9 @@ def _seen(
     world_normals: Float[np.ndarray, "n 3"],
     pose: Float[np.ndarray, "4 4"],
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n 3"]]:
-    """Depth along the camera's z, 0 where nothing is hit, and normals in CCS, towards the camera.
+    """Depth along the camera's z, 0 where nothing is hit, and normals in CCS towards the camera.
 
-    Open or thin surfaces may be seen from behind; a sensor does not care.
+    The back of an open surface counts as seen, as a real sensor measures it too.
     """
     depth = np.zeros(len(rays), dtype=np.float32)
     normals = np.zeros((len(rays), 3))

@@ -23,11 +23,26 @@ from pipeline.world.view import CameraView
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """Spread sigma(z, a) = (floor + linear z + quadratic (z - 0.4)^2) / cos a, in metres.
+    """A depth sensor's errors at depth z and angle of incidence a.
 
-    grazing_rad : no return beyond this incidence a. edge_m : a depth step to a neighbouring
-    pixel that makes the pixel an edge. edge_loss : share of edge pixels without return.
-    transparent_loss : share of pixels on transparent objects without return.
+    The standard deviation is sigma(z, a) = (floor + linear z + quadratic (z - 0.4)^2) / cos a [m].
+
+    Attributes
+    ----------
+    floor_m
+        Constant part of sigma [m].
+    linear
+        Factor of z.
+    quadratic_1_m
+        Factor of (z - 0.4)^2 [1/m].
+    grazing_rad
+        Angle of incidence beyond which nothing is measured [rad].
+    edge_m
+        Depth step to a neighbouring pixel that makes a pixel an edge pixel [m].
+    edge_loss
+        Share of the edge pixels that measure nothing.
+    transparent_loss
+        Share of the pixels on transparent objects that measure nothing.
     """
 
     floor_m: float

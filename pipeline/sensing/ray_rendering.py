@@ -22,7 +22,7 @@ _AMBIENT, _DIFFUSE = 0.35, 0.65  # shares of light from everywhere and from the 
 
 
 class RayRenderer:
-    """Embree rays: pure pip, plainer in colour, equal in depth."""
+    """Renders with Embree rays: needs no driver; depth as SAPIEN's, colours simpler."""
 
     name = "embree"
 

@@ -77,7 +77,23 @@ def render_views(
     cameras: Sequence[PinholeCamera],
     renderer: Renderer,
 ) -> ClutterScene:
-    """The same scene with its views, one a camera; through transparent objects one sees."""
+    """Render a scene with each camera; transparent objects let the view behind them through.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    objects
+        Catalogue entry of each object by its name.
+    cameras
+        The cameras.
+    renderer
+        SAPIEN's or Embree's.
+
+    Returns
+    -------
+    The same scene with one view for each camera.
+    """
     views = renderer.views(scene.objects, objects, cameras)
     opaque = [p for p in scene.objects if objects[p.object_name].material == "opaque"]
     if len(opaque) < len(scene.objects):

@@ -28,11 +28,11 @@ _Optics = tuple[int, int, tuple[float, ...]]
 
 
 class SapienRenderer:
-    """SAPIEN's rasteriser on a GPU or on lavapipe.
+    """SAPIEN's rasteriser, on a GPU or on lavapipe.
 
-    One world is kept for all scenes: a driver compiles its shaders once a kind of camera, which
-    takes seconds on a CPU, and a mesh is uploaded once for as long as its object stays on the
-    table. Raises MachineError where no Vulkan driver can render.
+    All scenes share one world: the driver compiles its shaders once for each kind of camera, which
+    takes seconds on a CPU, and the mesh of an object stays uploaded while the object stays in view.
+    Building it raises MachineError where no Vulkan driver can render.
     """
 
     name = "sapien"
@@ -95,7 +95,7 @@ class SapienRenderer:
 
 
 def render_table(config: ScenesConfig, camera: PinholeCamera) -> CameraView:
-    """The empty table: the least picture there is, to try a driver with."""
+    """Render the empty table: the smallest picture that shows whether a driver works."""
     return SapienRenderer(config).views((), {}, (camera,))[0]
 
 

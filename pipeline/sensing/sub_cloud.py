@@ -29,7 +29,26 @@ def sub_clouds(
     config: SensingConfig,
     radius_m: float,
 ) -> tuple[Float[np.ndarray, "b g g 3"], Bool[np.ndarray, "b g g"]]:
-    """Clouds in units of r_G (``radius_m``) and the cells that hold a measured point."""
+    """Cut the organised cloud around each contact out of one depth picture.
+
+    Parameters
+    ----------
+    depth_m
+        Depth along the camera's z [m], 0 where nothing was measured, shape (h, w).
+    camera
+        Where the picture was taken from.
+    world_from_contact
+        Frame of each contact, z out of the surface, shape (b, 4, 4).
+    config
+        Size of the grid.
+    radius_m
+        r_G [m].
+
+    Returns
+    -------
+    Points in the contact's frame in units of r_G, shape (b, g, g, 3); and the cells that hold a
+    measured point, shape (b, g, g).
+    """
     return merged_sub_clouds([(depth_m, camera)], world_from_contact, config, radius_m)
 
 
@@ -39,7 +58,23 @@ def merged_sub_clouds(
     config: SensingConfig,
     radius_m: float,
 ) -> tuple[Float[np.ndarray, "b g g 3"], Bool[np.ndarray, "b g g"]]:
-    """The same from the points of several depth images together (Supplement VI)."""
+    """Cut the organised clouds out of several depth pictures together (Supplement VI).
+
+    Parameters
+    ----------
+    pictures
+        Depth [m], 0 where nothing was measured, and camera of each picture.
+    world_from_contact
+        Frame of each contact, z out of the surface, shape (b, 4, 4).
+    config
+        Size of the grid.
+    radius_m
+        r_G [m].
+
+    Returns
+    -------
+    As `sub_clouds`.
+    """
     count, cells = len(world_from_contact), config.grid_cells
     box = (config.grid_side_m / 2, config.grid_depth_m, config.grid_height_m)
     seen_by = []

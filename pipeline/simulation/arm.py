@@ -162,7 +162,7 @@ class ArmMover:
         world_from_gripper: Float[np.ndarray, "4 4"],
         seed_rad: Float[np.ndarray, " 7"],
     ) -> Float[np.ndarray, " 7"] | None:
-        """Joint angles for a pose from one starting point [rad]; None if not found within limits."""
+        """Joint angles for a pose from one starting point [rad]; None if none are within limits."""
         base_from_gripper = invert(self._base) @ world_from_gripper
         found, solved, _ = self._model.compute_inverse_kinematics(
             self._pad_index,
