@@ -38,7 +38,7 @@ from pipeline.reporting.agreement import as_csv
 from pipeline.reporting.facts import read_catalogue
 from pipeline.reporting.holdout import as_markdown
 from pipeline.reporting.page import html_page
-from pipeline.spread import spread
+from pipeline.spread import choose_evenly
 from pipeline.stopwatch import Stopwatch
 from stages.graph import GIVEN_NETWORK, RUNS_DIR
 from stages.shards import gather
@@ -140,7 +140,7 @@ def labelled(folder: RunFolder) -> tuple[tuple[str, ...], Samples]:
 
 def baselines(samples: Samples, config: RunConfig) -> dict[str, float]:
     """Errors of the released baseline on some of the grasps, equally far apart."""
-    some = np.array(spread(len(samples), config.holdout.baseline_grasps), dtype=np.int64)
+    some = np.array(choose_evenly(len(samples), config.holdout.baseline_grasps), dtype=np.int64)
     if not len(some):
         return {}
     source = quality_source(ANALYTIC, config.gripper, config.train.threads)

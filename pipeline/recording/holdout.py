@@ -14,7 +14,7 @@ from pipeline.network.by_object import ObjectError
 from pipeline.network.figures import calibration
 from pipeline.network.samples import Samples
 from pipeline.recording import colours
-from pipeline.recording.recording import looking, numbered, step, time_panel
+from pipeline.recording.recording import eye_at, set_step, start_path, time_panel
 from pipeline.recording.train import show_calibration, show_sheet
 
 TIMELINE = "object"
@@ -27,7 +27,7 @@ def blueprint() -> rrb.Blueprint:
             rrb.Spatial3DView(
                 origin="/world/worst",
                 name="Worst clouds of the object: q / q-hat, units of r_G",
-                eye_controls=looking((7.5, -18.0, 12.0), (7.5, -4.5, 0.0)),
+                eye_controls=eye_at((7.5, -18.0, 12.0), (7.5, -4.5, 0.0)),
             ),
             rrb.Vertical(
                 rrb.TextDocumentView(origin="/notes/object", name="Object"),
@@ -87,10 +87,10 @@ def show_holdout(
     _note(stream, "result", text, static=True)
     error = np.abs(predicted - quality)
     for number, one in enumerate(ordered):
-        step(stream, TIMELINE, number)
+        set_step(stream, TIMELINE, number)
         own = np.flatnonzero(samples.object_index == names.index(one.name))
         worst = own[np.argsort(-error[own], kind="stable")[:shown]]
-        path = numbered(stream, "world/worst", number)
+        path = start_path(stream, "world/worst", number)
         show_sheet(stream, path, samples, predicted, worst, static=False)
         _note(stream, "object", _facts(one), static=False)
 

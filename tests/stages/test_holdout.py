@@ -15,7 +15,7 @@ from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder
 from pipeline.network.sources import RELEASED
 from pipeline.recording.recording import TIMELINES
-from pipeline.recording.viewer import sight_of
+from pipeline.recording.viewer import photograph
 from stages.graph import EVALUATE, GIVEN_NETWORK, inputs_of
 from stages.holdout import measure, prepare
 from tests.stages.conftest import ROOT
@@ -69,7 +69,7 @@ def test_figures_are_of_one_prediction_and_of_eight(made: RunFolder) -> None:
 
 
 def test_the_recording_is_seen(made: RunFolder) -> None:
-    sight = sight_of(made.recording("holdout"))
+    sight = photograph(made.recording("holdout"))
     assert sight.problems == ()
     assert sight.timeline == TIMELINES["holdout"]
 
