@@ -29,7 +29,7 @@ ifeq (,$(strip $(WORKERS)))
 unexport WORKERS
 endif
 
-.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee holdout review report export predict real docs lint fuzz regress clean FORCE
+.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee holdout review report export predict real calibrate docs lint fuzz regress clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -138,6 +138,9 @@ predict: .venv/.ready  ## grasps on a real picture: DEPTH=file [camera=file mask
 real: .venv/.ready  ## network and baseline on real frames: FRAMES=folder [tilt_deg=90 ...], to runs/<run>/real
 	@test -n "$(FRAMES)" || { echo "Give the frames: make real FRAMES=folder"; exit 1; }
 	@$(PY) -m stages.real $(FRAMES) $(foreach option,tilt-deg radius-mm out,$(if $($(subst -,_,$(option))),--$(option) "$($(subst -,_,$(option)))"))
+
+calibrate: .venv/.ready  ## from which q-hat on RUN's network (or NETWORK) is right, to runs/<run>/calibration.json
+	@$(PY) -m stages.calibrate
 
 docs: .venv/.ready  ## the pages and a reference of every module as a site, to runs/docs
 	@$(PY) -m stages.docs

@@ -117,7 +117,19 @@ class PredictConfig(Section):
         description="the same as a share of the distance from the camera, whichever is more [1]",
     )
     quality_min: float = Field(
-        0.3, ge=0, le=1, description="under this q-hat no grasp is called good [1]"
+        0.3,
+        ge=0,
+        le=1,
+        description="under this q-hat no grasp is called good; `make calibrate` chooses it [1]",
+    )
+    good_quality: float = Field(
+        0.5, gt=0, lt=1, description="make calibrate: a grasp is good from this q on [1]"
+    )
+    good_probability: float = Field(
+        0.8,
+        gt=0,
+        lt=1,
+        description="make calibrate: of the grasps at quality_min, how many are good [1]",
     )
     support: SupportConfig = SupportConfig()
     trial: TrialConfig = TrialConfig()
