@@ -29,7 +29,7 @@ ifeq (,$(strip $(WORKERS)))
 unexport WORKERS
 endif
 
-.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee holdout review report export predict real calibrate docs lint fuzz regress clean FORCE
+.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee holdout review report export predict real calibrate live docs lint fuzz regress clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -141,6 +141,10 @@ real: .venv/.ready  ## network and baseline on real frames: FRAMES=folder [tilt_
 
 calibrate: .venv/.ready  ## from which q-hat on RUN's network (or NETWORK) is right, to runs/<run>/calibration.json
 	@$(PY) -m stages.calibrate
+
+live: .venv/.ready  ## grasps on every depth picture of a bag in recorded time: BAG=file.mcap [topic=/depth ...]
+	@test -n "$(BAG)" || { echo "Give the bag: make live BAG=file.mcap"; exit 1; }
+	@$(PY) -m stages.live $(BAG) $(foreach option,topic depth-scale-m radius-mm tilt-deg out,$(if $($(subst -,_,$(option))),--$(option) "$($(subst -,_,$(option)))"))
 
 docs: .venv/.ready  ## the pages and a reference of every module as a site, to runs/docs
 	@$(PY) -m stages.docs

@@ -167,6 +167,35 @@ def _support_of(
     frames: Sequence[Frame], config: RunConfig, rng: np.random.Generator
 ) -> Support | None:
     """The support; None where there is none and every frame has a mask of its own."""
+    try:
+        return support_of(frames, config, rng)
+    except PictureError:
+        if all(not frame.allowed.all() for frame in frames):
+            return None
+        raise
+
+
+def support_of(frames: Sequence[Frame], config: RunConfig, rng: np.random.Generator) -> Support:
+    """What objects stand on in pictures of one scene.
+
+    Parameters
+    ----------
+    frames
+        The pictures.
+    config
+        The run's configuration; ``predict.support`` matters.
+    rng
+        Draws the points that planes are fitted to.
+
+    Returns
+    -------
+    The support.
+
+    Raises
+    ------
+    PictureError
+        There is none; the error names the first picture.
+    """
     settings = config.predict.support
     if settings.height_m is not None:
         return level_support(settings.height_m)
@@ -190,8 +219,6 @@ def _support_of(
             rng,
         )
     except PictureError as error:
-        if all(not frame.allowed.all() for frame in frames):
-            return None
         raise PictureError(f"{frames[0].name}: {error.what}", error.remedy) from error
 
 
@@ -212,7 +239,8 @@ def _graspable(frame: Frame, support: Support | None, config: RunConfig) -> Bool
         eye = frame.camera.world_from_camera[:3, 3]
         distance_m = np.linalg.norm(points - eye, axis=1)
         least = np.maximum(settings.above_support_m, settings.above_support_share * distance_m)
-        chosen &= (points[:, 2] > least) & inside(support, points, settings.support)
+        chosen &= points[:, 2] > least
+        chosen[chosen] = inside(support, points[chosen], settings.support)
     picture = np.zeros(frame.depth_m.shape, dtype=bool)
     picture[rows[chosen], columns[chosen]] = True
     return picture

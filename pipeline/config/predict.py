@@ -92,6 +92,21 @@ class TrialConfig(Section):
     )
 
 
+class LiveConfig(Section):
+    """How `make live` answers every picture of a stream."""
+
+    every_px: int = Field(2, ge=1, le=16, description="of so many pixels a side one is used")
+    candidates: int = Field(96, ge=1, le=4096, description="contacts that are tried a picture")
+    top: int = Field(5, ge=1, le=100, description="grasps that are given out a picture")
+    support_kept_share: float = Field(
+        0.5,
+        ge=0,
+        le=1,
+        description="the support stays where at least so much of a picture lies on it as when it "
+        "was found [1]",
+    )
+
+
 class PredictConfig(Section):
     """From a real picture to ranked grasps."""
 
@@ -133,6 +148,7 @@ class PredictConfig(Section):
     )
     support: SupportConfig = SupportConfig()
     trial: TrialConfig = TrialConfig()
+    live: LiveConfig = LiveConfig()
 
     @model_validator(mode="after")
     def _top_are_among_the_candidates(self) -> Self:

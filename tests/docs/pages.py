@@ -30,6 +30,14 @@ REDUCED = {
         "make -n real FRAMES=runs/pictures",
         "tests/stages/test_real.py runs it on smaller frames",
     ),
+    "make live BAG=drive.mcap": (
+        "make -n live BAG=drive.mcap",
+        "tests/stages/test_live.py runs it on a bag of its own",
+    ),
+    "make calibrate RUN=ci": (
+        "make -n calibrate RUN=ci",
+        "the tiny run has too few samples; tests/stages/test_calibrate.py runs it",
+    ),
     "make review RUN=ci STAGE=grasps": (
         "make -n review RUN=ci STAGE=grasps",
         "it ends when its viewer is closed; tests/stages/test_review.py opens it",
