@@ -19,6 +19,7 @@ from pipeline.execution.commands import run_command
 from pipeline.execution.stage import RunFolder, Stage, StageContext
 from pipeline.execution.staleness import (
     RECORDING_ALONE,
+    built_key,
     missing_shards,
     recording_is_fresh,
     stage_context,
@@ -123,7 +124,7 @@ def key(stage: str, run: RunName = "default", mesh_dir: MeshDir = None) -> None:
     context = stage_context(MADE[stage], folder, inputs_of, mesh_dir, workers=1)
     path = folder.state(f"{stage}.key")
     text = context.key.to_json() + context.drawing_key.to_json()
-    if path.is_file() and path.read_text() == text and not _lost(context):
+    if path.is_file() and path.read_text() == text and not _lacking(context):
         return
     if context.output.is_file():
         for reason in why_stale(context):
@@ -159,10 +160,13 @@ def _staleness(stage: Stage, folder: RunFolder, mesh_dir: Path | None, stale: se
     return "; ".join(why_stale(stage_context(stage, folder, inputs_of, mesh_dir, workers=1)))
 
 
-def _lost(context: StageContext) -> bool:
-    """Whether part of a finished stage has gone: Make sees the artifact, or its index, alone."""
+def _lacking(context: StageContext) -> bool:
+    """Whether a finished stage lacks something: Make sees the artifact, or its index, alone."""
     if not context.output.is_file():
         return False
+    built = built_key(context.folder, context.name)
+    if built is not None and not built.is_final:
+        return True
     shards_lost = context.stage.sharded and bool(missing_shards(context.output))
     return shards_lost or not recording_is_fresh(context)
 

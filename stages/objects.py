@@ -1,60 +1,66 @@
 """Stage 1, objects: meshes in → repaired, rescaled, classed by NSVR, cut into convex parts."""
 
 from collections import Counter
-from collections.abc import Mapping
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
-from pathlib import Path
 
 from loguru import logger
 
 from pipeline.artifacts import ArtifactWriter, publish_bytes
-from pipeline.config import ObjectsConfig, section_digest
+from pipeline.config import section_digest
 from pipeline.errors import MeshError
 from pipeline.execution import (
+    Allowance,
+    Isolation,
+    Lost,
     StageContext,
     Summary,
     generator,
     progress,
-    run_in_order,
     stage_command,
 )
-from pipeline.geometry.catalogue import (
-    CatalogueObject,
-    MeasuredObject,
-    finish_object,
-    measure_object,
-)
+from pipeline.geometry.catalogue import CatalogueObject, MeasuredObject
 from pipeline.geometry.families import DeclaredFamily, read_declared
+from pipeline.geometry.intake import (
+    Source,
+    all_sources,
+    finished_or_why_not,
+    measured_or_why_not,
+)
 from pipeline.geometry.masses import mass_of, read_masses
 from pipeline.geometry.mesh_folders import FAMILIES_FILE, MASSES_FILE
-from pipeline.geometry.object_names import readable_name
-from pipeline.geometry.parametric import PARAMETRIC_OBJECTS, parametric_source
 from pipeline.geometry.plan import Plan, plan_catalogue
 from pipeline.geometry.selection import Split
 from pipeline.geometry.settled import SETTLED_FILE, read_settled
 from pipeline.geometry.stretching import stretched_for_training
-from pipeline.geometry.urdf_files import load_object_file, standalone
 from pipeline.messages.objects import REFUSED_TOPIC, TOPIC, object_message, refused_message
 from pipeline.recording.objects import draw_objects
 from schemas.softgrip.v1.objects_pb2 import RefusedMesh
 from stages.graph import OBJECTS, inputs_of
 
-Source = tuple[Path | None, str]  # a mesh file and its path in its folder, or an embedded name
+TRIED_AGAIN = "It is tried again next time; mend it, or take it out of the folder"
 
 
 def build(stage: StageContext) -> Summary:
     """Turn meshes into the object catalogue: repair, rescale, NSVR, convex parts, split."""
     config, seed = stage.config.objects, stage.config.seed
     jobs, added = sources(stage)
-    measured, refused = measure(stage, jobs)
     settled_in = stage.folder.state(SETTLED_FILE)
-    settled = read_settled(settled_in, settling_basis(stage))
-    plan = plan_catalogue(
-        measured, added, declared_families(stage), (config, stage.config.split), seed, settled
+    planned = partial(
+        plan_catalogue,
+        added=added,
+        declared=declared_families(stage),
+        configs=(config, stage.config.split),
+        seed=seed,
+        settled=read_settled(settled_in, settling_basis(stage)),
     )
-    refused += [told(source, why) for source, why in plan.left_out]
-    objects = finish(stage, plan)
+    left_out, most = LeftOut(), Allowance(config.max_seconds, config.max_memory_mib)
+    with Isolation(stage.workers, most, stage.executor) as apart:
+        measured = measure(stage, jobs, apart, left_out)
+        plan, objects = finish(stage, measured, planned, apart, left_out)
+    for source, why in plan.left_out:
+        left_out.add(source, why)
     rng_of = partial(generator, seed, "object")
     threshold = stage.config.split.family_threshold
     stretched, near = stretched_for_training(objects, plan, config, rng_of, threshold)
@@ -63,8 +69,25 @@ def build(stage: StageContext) -> Summary:
     publish_bytes(settled_in, plan.settled.to_json().encode())
     for remark in plan.remarks:
         logger.warning("{}", remark)
-    publish(stage, objects, split, refused)
-    return summary(objects, split, refused) | {"stretched_near_held_out": near, **plan.figures}
+    publish(stage, objects, split, left_out)
+    figures = {"stretched_near_held_out": near, **plan.figures}
+    return summary(objects, split, left_out.refused) | figures
+
+
+@dataclass
+class LeftOut:
+    """Meshes that did not become objects, as records, and which of them a process was lost to."""
+
+    refused: list[RefusedMesh] = field(default_factory=list)
+    cut_short: list[str] = field(default_factory=list)
+
+    def add(self, source: str, why: MeshError | Lost) -> None:
+        """Record a mesh that is left out, and tell the reader."""
+        if isinstance(why, Lost):
+            self.cut_short.append(source)
+            why = MeshError(f"{source} {why.how}", TRIED_AGAIN)
+        logger.warning("left out: {}", why)
+        self.refused.append(refused_message(source, why))
 
 
 def settling_basis(stage: StageContext) -> str:
@@ -75,105 +98,80 @@ def settling_basis(stage: StageContext) -> str:
 
 def declared_families(stage: StageContext) -> tuple[DeclaredFamily, ...]:
     """The families that run.toml's file, or else the mesh folder's, declares."""
-    path = stage.inputs.get(FAMILIES_FILE)
-    return read_declared(path) if path else ()
+    return read_declared(path) if (path := stage.inputs.get(FAMILIES_FILE)) else ()
 
 
 def sources(stage: StageContext) -> tuple[list[Source], frozenset[str]]:
-    """Every source, and the names of the embedded ones that meshes are trained beside.
-
-    Raises MeshError where a mesh has the name of an embedded object that would stand beside it.
-    """
-    embedded: list[Source] = [(None, name) for name in sorted(PARAMETRIC_OBJECTS)]
-    folder = stage.mesh_dir
-    if folder is None:
-        return embedded, frozenset()
+    """Every source, and the names of the embedded ones that meshes are trained beside."""
     paths = [path for name, path in stage.inputs.items() if name.startswith("meshes/")]
-    meshes: list[Source] = [
-        (path, path.relative_to(folder).as_posix()) for path in standalone(paths, folder)
-    ]
-    if not stage.config.objects.embedded_in_training:
-        return meshes, frozenset()
-    for path, label in meshes:
-        if readable_name(label) in PARAMETRIC_OBJECTS:
-            raise MeshError(
-                f"{path} has the name of an embedded object",
-                "Rename the file, or set objects.embedded_in_training = false",
-            )
-    return meshes + embedded, frozenset(PARAMETRIC_OBJECTS)
+    return all_sources(paths, stage.mesh_dir, stage.config.objects.embedded_in_training)
 
 
 def measure(
-    stage: StageContext, jobs: list[Source]
-) -> tuple[list[MeasuredObject], list[RefusedMesh]]:
+    stage: StageContext, jobs: list[Source], apart: Isolation, left_out: LeftOut
+) -> list[MeasuredObject]:
     """Load, repair and measure every source; what is refused is named, the others go on."""
     job = partial(measured_or_why_not, config=stage.config.objects, folder=stage.mesh_dir)
-    results = run_in_order(job, jobs, stage.workers, stage.executor)
-    measured, refused = [], []
-    shown = progress(results, len(jobs), "objects: repair and NSVR", "mesh")
+    shown = progress(apart.run_in_order(job, jobs), len(jobs), "objects: repair and NSVR", "mesh")
+    measured = []
     for (_, name), result in zip(jobs, shown, strict=True):
-        if isinstance(result, MeshError):
-            refused.append(told(name, result))
+        if isinstance(result, MeshError | Lost):
+            left_out.add(name, result)
         else:
             measured.append(result)
-    return measured, refused
+    return measured
 
 
-def told(name: str, why: MeshError) -> RefusedMesh:
-    """The record of a source that is left out, and a word to the reader."""
-    logger.warning("left out: {}", why)
-    return refused_message(name, why)
-
-
-def measured_or_why_not(
-    job: Source, config: ObjectsConfig, folder: Path | None
-) -> MeasuredObject | MeshError:
-    """One source measured, or why it cannot be."""
-    path, name = job
-    try:
-        if path is None or folder is None:
-            return measure_object(parametric_source(name), config)
-        return measure_object(load_object_file(path, folder, name, config), config)
-    except MeshError as error:
-        return error
-
-
-def finish(stage: StageContext, plan: Plan) -> list[CatalogueObject]:
-    """Bring every object that is taken to its size, and cut it into convex parts."""
-    cache = stage.folder.cache / "convex_parts"
-    path = stage.inputs.get(MASSES_FILE)
-    masses = read_masses(path) if path else {}
-    config, seed = stage.config.objects, stage.config.seed
-    job = partial(finished, config=config, seed=seed, cache=cache, masses=masses)
-    results = run_in_order(job, plan.taken, stage.workers, stage.executor)
-    shown = progress(results, len(plan.taken), "objects: convex parts", "object")
+def finish(
+    stage: StageContext,
+    measured: list[MeasuredObject],
+    planned: Callable[[Sequence[MeasuredObject]], Plan],
+    apart: Isolation,
+    left_out: LeftOut,
+) -> tuple[Plan, list[CatalogueObject]]:
+    """Size, weigh and cut into convex parts what is taken; plan anew without what cannot be cut."""
+    config, cache = stage.config.objects, stage.folder.cache / "convex_parts"
+    job = partial(finished_or_why_not, config=config, cache=cache)
+    rng_of = partial(generator, stage.config.seed, "object")
+    masses = read_masses(path) if (path := stage.inputs.get(MASSES_FILE)) else {}
+    plan = planned(measured)
+    done: dict[tuple[str, ...], CatalogueObject] = {}
+    while todo := [item for item in plan.taken if known_as(item) not in done]:
+        drawn = [(i, rng_of(i.content), mass_of(i.source.name, masses)) for i in todo]
+        results = apart.run_in_order(job, drawn)
+        failed = set()
+        for item, result in zip(
+            todo, progress(results, len(todo), "objects: convex parts", "object"), strict=True
+        ):
+            if isinstance(result, MeshError | Lost):
+                left_out.add(item.origin, result)
+                failed.add(item.origin)
+            else:
+                done[known_as(item)] = result
+        if failed:
+            measured = [item for item in measured if item.origin not in failed]
+            plan = planned(measured)
     of, copies = plan.families.of, plan.copies
-    return [replace(item, family=of[item.name], copies=copies.get(item.name, ())) for item in shown]
+    made = [done[known_as(item)] for item in plan.taken]
+    return plan, [replace(i, family=of[i.name], copies=copies.get(i.name, ())) for i in made]
 
 
-def finished(
-    measured: MeasuredObject,
-    config: ObjectsConfig,
-    seed: int,
-    cache: Path,
-    masses: Mapping[str, float],
-) -> CatalogueObject:
-    """Rescale one object, weigh it and cut it into convex parts."""
-    rng = generator(seed, "object", measured.content)
-    return finish_object(measured, config, rng, cache, mass_of(measured.source.name, masses))
+def known_as(item: MeasuredObject) -> tuple[str, ...]:
+    """What an object is finished with: name and unit may be others in a plan without a mesh."""
+    return item.origin, item.source.name, item.source.unit
 
 
 def publish(
     stage: StageContext,
     objects: list[CatalogueObject],
     split: Mapping[str, Split],
-    refused: list[RefusedMesh],
+    left_out: LeftOut,
 ) -> None:
     """Write the artifact."""
-    with ArtifactWriter(stage.output, stage.provenance()) as artifact:
+    with ArtifactWriter(stage.output, stage.provenance(left_out.cut_short)) as artifact:
         for index, item in enumerate(objects):
             artifact.write(TOPIC, object_message(item, split[item.name]), log_time_ns=index)
-        for index, message in enumerate(refused):
+        for index, message in enumerate(left_out.refused):
             artifact.write(REFUSED_TOPIC, message, log_time_ns=index)
 
 

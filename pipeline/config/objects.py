@@ -56,6 +56,16 @@ class ObjectsConfig(ScaledSection):
     max_extent_m: float = Field(5.0, gt=0, description="larger meshes are refused [m]")
     max_file_mib: int = Field(512, ge=1, description="larger mesh files are refused unread [MiB]")
     max_faces: int = Field(2_000_000, ge=4, description="meshes with more faces are refused")
+    max_seconds: float = Field(
+        900.0,
+        ge=1,
+        description="safety net: a mesh on which work takes longer is left out for now [s]",
+    )
+    max_memory_mib: int = Field(
+        4096,
+        ge=64,
+        description="safety net: a mesh on which work takes more is left out for now [MiB]",
+    )
     max_hole_fraction: float = Field(
         0.02, ge=0, le=1, description="largest area share of the surface that repair may invent [1]"
     )

@@ -2,12 +2,16 @@
 
 from pipeline.execution.commands import run_command
 from pipeline.execution.executors import run_in_order
+from pipeline.execution.isolated import Allowance, Isolation, Lost
 from pipeline.execution.running import Summary, stage_command
 from pipeline.execution.seeds import derive_seed, generator
 from pipeline.execution.stage import RunFolder, Stage, StageContext
 from pipeline.progress import progress
 
 __all__ = [
+    "Allowance",
+    "Isolation",
+    "Lost",
     "RunFolder",
     "Stage",
     "StageContext",

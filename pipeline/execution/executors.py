@@ -102,14 +102,14 @@ def _submit(pool: ProcessPoolExecutor, job: Callable[[Item], Result], item: Item
     one then fails on the closed pipes with another error.
     """
     try:
-        with _defer_interrupts():
+        with defer_interrupts():
             return pool.submit(job, item)
     except (ValueError, OSError) as error:
         raise BrokenProcessPool(f"no further worker could be started: {error}") from error
 
 
 @contextmanager
-def _defer_interrupts() -> Iterator[None]:
+def defer_interrupts() -> Iterator[None]:
     """Start workers that never receive SIGINT, not even while their interpreter starts.
 
     A terminal sends SIGINT to the whole process group, and only the driver is to end the run. The

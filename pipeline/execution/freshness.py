@@ -10,7 +10,8 @@ only draws changes that key alone.
 import hashlib
 import json
 import platform
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from pipeline.execution.code import DRAWING, RUNNING, code_digests
 from pipeline.execution.packages import package_versions
 
 PARTS = ("config", "code", "machine", "inputs")
+CUT_SHORT = "cut_short"  # entry of the machine's part: inputs left out for want of time or memory
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,9 @@ class Key:
         ``python``, ``renderer`` and packages → version, in words.
     inputs
         Input → digest of its content.
+
+    A result from which inputs were left out because a process ran out of time or memory, or died,
+    has a key of its own, which no machine has: it is never fresh.
     """
 
     config: dict[str, str]
@@ -58,6 +63,17 @@ class Key:
         """SHA-256 over the code part."""
         return _digest(self.code)
 
+    @property
+    def is_final(self) -> bool:
+        """Whether all inputs were worked on to their end."""
+        return CUT_SHORT not in self.machine
+
+    def cut_short(self, names: Sequence[str]) -> "Key":
+        """The key of a result that lacks these inputs; with none, the key itself."""
+        if not names:
+            return self
+        return replace(self, machine=self.machine | {CUT_SHORT: ", ".join(sorted(names))})
+
     def to_json(self) -> str:
         """The parts as text, stable from run to run."""
         return json.dumps(self._parts(), indent=1, sort_keys=True) + "\n"
@@ -69,7 +85,9 @@ class Key:
             now, then = getattr(self, part), getattr(older, part)
             found += [f"{word} {name} changed" for name in now if now[name] != then.get(name)]
             found += [f"{word} {name} is gone" for name in then if name not in now]
-        for name in sorted(self.machine | older.machine):
+        if not older.is_final:
+            found.append(f"not finished, and tried again: {older.machine[CUT_SHORT]}")
+        for name in sorted((self.machine | older.machine).keys() - {CUT_SHORT}):
             now, then = (key.machine.get(name, "absent") for key in (self, older))
             found += [f"{name} was {then}, is {now}"] if now != then else []
         return found

@@ -1,7 +1,8 @@
 """Work items on an existing Ray cluster, results in order, as from local processes.
 
 Every node must see the run's folder under the path it has here, and hold the same packages.
-A job that dies with its node is made again on another: jobs keep what is already whole.
+A job that dies with its node is made again on another: jobs keep what is already whole. So is one
+that Ray ends because its node runs out of memory, as often.
 """
 
 import importlib
@@ -22,6 +23,8 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 MOST_RETRIES = 5  # of an item whose node died: nodes that die so often are no cluster
+# Ray's own setting, read from the environment when Ray is loaded; by default it never gives up.
+_MEMORY_RETRIES = "RAY_task_oom_retries"
 AHEAD_PER_CPU = 2  # items in flight, so that a slow driver bounds memory
 
 
@@ -50,7 +53,11 @@ class JobByName:
         return function(*self.before, item, **self.keywords)
 
 
-def run_on_ray(job: Callable[[Item], Result], items: Iterable[Item]) -> Iterator[Result]:
+def run_on_ray(
+    job: Callable[[Item], Result],
+    items: Iterable[Item],
+    lost: Callable[[str], Result] | None = None,
+) -> Iterator[Result]:
     """Compute ``job(item)`` for every item on a Ray cluster, one CPU each.
 
     The cluster is the one RAY_ADDRESS names, else the one started on this machine.
@@ -61,6 +68,8 @@ def run_on_ray(job: Callable[[Item], Result], items: Iterable[Item]) -> Iterator
         A module-level function of one item.
     items
         Picklable values.
+    lost
+        Makes the result of an item that cost every worker its life, from what became of it.
 
     Yields
     ------
@@ -72,12 +81,12 @@ def run_on_ray(job: Callable[[Item], Result], items: Iterable[Item]) -> Iterator
     MachineError
         Ray is not installed, no cluster answers, or no node could find the job.
     SoftgripError
-        The node of a job died more often than the job is tried again.
+        The worker of a job died more often than the job is tried again, and ``lost`` is not given.
     """
     named = job_by_name(job)
+    os.environ.setdefault(_MEMORY_RETRIES, str(MOST_RETRIES))
     try:
         import ray
-        from ray.exceptions import RayTaskError, WorkerCrashedError
     except ImportError as error:
         raise MachineError("Ray is not installed", "pip install 'softgrip[ray]'") from error
     try:
@@ -98,18 +107,33 @@ def run_on_ray(job: Callable[[Item], Result], items: Iterable[Item]) -> Iterator
         for item in items:
             waiting.append(remote.remote(pickle.dumps((named, item)), there, program))
             if len(waiting) >= ahead:
-                yield _unpickled(ray.get(waiting.popleft()), {program: "__main__"})
+                yield _result(waiting.popleft(), program, lost)
         while waiting:
-            yield _unpickled(ray.get(waiting.popleft()), {program: "__main__"})
-    except RayTaskError as error:
-        raise error.cause from error
-    except WorkerCrashedError as error:
-        raise SoftgripError(
-            "A Ray worker died again and again: it was killed or its node ran out of memory",
-            "Run the same command again, it goes on where it stopped",
-        ) from error
+            yield _result(waiting.popleft(), program, lost)
     finally:
         ray.shutdown()
+
+
+def _result(sent: Any, program: str, lost: Callable[[str], Any] | None) -> Any:
+    """The result of an item, waited for; a worker's death after all retries is told or ``lost``."""
+    import ray
+    from ray.exceptions import OutOfMemoryError, RayTaskError, WorkerCrashedError
+
+    try:
+        return _unpickled(ray.get(sent), {program: "__main__"})
+    except RayTaskError as error:
+        raise error.cause from error
+    except (OutOfMemoryError, WorkerCrashedError) as error:
+        memory = isinstance(error, OutOfMemoryError)
+        if lost is not None:
+            return lost("took the memory of its node" if memory else "ended its Ray worker")
+        raise SoftgripError(
+            "A node of the Ray cluster ran out of memory again and again"
+            if memory
+            else "A Ray worker died again and again: it was killed or its node ran out of memory",
+            "Run the same command again, it goes on where it stopped"
+            + ("; give the nodes more memory, or fewer CPUs" if memory else ""),
+        ) from error
 
 
 def job_by_name(job: Callable[[Item], Result]) -> JobByName:

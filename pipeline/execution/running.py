@@ -16,7 +16,7 @@ import typer
 from filelock import FileLock, Timeout
 from loguru import logger
 
-from pipeline.artifacts import publish_bytes
+from pipeline.artifacts import publish_bytes, read_provenance
 from pipeline.artifacts.publishing import CANNOT_WRITE, remove_abandoned_scratch, write_error
 from pipeline.errors import SoftgripError
 from pipeline.execution.commands import EXIT_FAILURE, log_to
@@ -124,7 +124,7 @@ def run_stage(
     wall_s, spent_s = time.perf_counter() - started, processor_time_s() - spent_s
     record = {
         "stage": name,
-        "key": context.key.digest,
+        "key": read_provenance(context.output).key,
         "wall_time_s": round(wall_s, 3),
         "recording_share": round(context.drawing.seconds / max(spent_s, CLOCK_TICK_S), 4),
         **_recording_size(context),

@@ -1,5 +1,6 @@
 """A stage as data, the folder of its run, and the context that it runs in."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -162,15 +163,26 @@ class StageContext:
         """The artifact of a stage this one reads."""
         return self.inputs[f"{stage}.mcap"]
 
-    def provenance(self) -> Provenance:
-        """The record every file of this stage carries."""
+    def provenance(self, cut_short: Sequence[str] = ()) -> Provenance:
+        """The record every file of this stage carries.
+
+        Parameters
+        ----------
+        cut_short
+            Inputs that were left out for want of time or memory; with any, the file is never fresh.
+
+        Returns
+        -------
+        The record.
+        """
+        key = self.key.cut_short(cut_short)
         return Provenance(
             stage=self.stage.name,
-            key=self.key.digest,
-            config_digest=self.key.config_digest,
-            code_digest=self.key.code_digest,
+            key=key.digest,
+            config_digest=key.config_digest,
+            code_digest=key.code_digest,
             seed=self.config.seed,
-            inputs=tuple(Input(name, digest) for name, digest in self.key.inputs.items()),
+            inputs=tuple(Input(name, digest) for name, digest in key.inputs.items()),
             package_version=package_version(),
-            key_parts=self.key.to_json(),
+            key_parts=key.to_json(),
         )

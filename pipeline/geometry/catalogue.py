@@ -53,6 +53,11 @@ class MeasuredObject:
         """Whether it is of the embedded set, and no file's."""
         return self.source.sha256 == EMBEDDED
 
+    @property
+    def origin(self) -> str:
+        """A mesh file's path in its folder, or an embedded object's name."""
+        return self.source.name if self.embedded else self.source.label
+
     def in_unit(self, unit: str, config: ObjectsConfig) -> "MeasuredObject":
         """The same object, its file read in another unit. Raises MeshError where it is too thin."""
         source = self.source.in_unit(unit)

@@ -95,3 +95,14 @@ def test_a_recordings_key_follows_its_artifact_and_what_draws_alone() -> None:
     assert drawing_key(fewer, shown, module, artifact).differences(key) == [
         "configuration recording.objects changed"
     ]
+
+
+def test_a_result_that_lacks_inputs_for_want_of_time_has_a_key_of_its_own() -> None:
+    key = Key({"seed": "a"}, {"stages/objects.py": "b"}, {"python": "3.11"}, {"meshes/x": "c"})
+    short = key.cut_short(["x.ply"])
+    assert key.is_final
+    assert not short.is_final
+    assert short.digest != key.digest
+    assert key.cut_short([]) == key
+    assert key.differences(short) == ["not finished, and tried again: x.ply"]
+    assert key_from_json(short.to_json()) == short

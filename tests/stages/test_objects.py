@@ -9,6 +9,7 @@ from rerun.chunk import RrdReader
 from pipeline.errors import ConfigError, MeshError
 from pipeline.execution import RunFolder, StageContext
 from pipeline.execution.staleness import stage_context
+from pipeline.geometry import intake
 from pipeline.geometry.parametric import PARAMETRIC_OBJECTS
 from pipeline.messages.objects import read_objects
 from pipeline.recording.objects import draw_objects
@@ -45,7 +46,7 @@ def test_embedded_objects_stand_beside_meshes_in_training_alone(
     tmp_path: Path, mesh_dir: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     few = dict(sorted(PARAMETRIC_OBJECTS.items())[:3])
-    monkeypatch.setattr(objects, "PARAMETRIC_OBJECTS", few)
+    monkeypatch.setattr(intake, "PARAMETRIC_OBJECTS", few)
     stage = context(tmp_path, mesh_dir, BESIDE)
     made = objects.build(stage)
     split = {name: where for name, (_, where) in read_objects(stage.output).items()}
