@@ -15,13 +15,15 @@ from jaxtyping import Float
 from pipeline.geometry.catalogue import MeasuredObject
 from pipeline.geometry.descriptor import shape_distance
 from pipeline.geometry.registration import Shape, distance_laid_on, shape_of
-from pipeline.geometry.shape import outer_surface
+from pipeline.geometry.shape import outer_surface, volume
 from pipeline.geometry.units import METRES_PER_UNIT
 
 # Of 47 scans simplified to a quarter of their faces, all but a bowl, a plate and a chain, which are
 # thin, keep cbrt(V) to 1 % and their descriptor to 0.03. Registration judges what comes through.
 _SIZE_TOLERANCE = 0.01
 _DESCRIPTOR_TOLERANCE = 0.03
+# A cavity that takes more of the volume makes another object of the same outer surface.
+_FILLED_TOLERANCE = 0.01
 _METRES = np.array(list(METRES_PER_UNIT.values()))
 _LOG_FACTORS = np.log(np.unique(_METRES[:, None] / _METRES))
 
@@ -50,13 +52,16 @@ def find_copies(
     ranked = [_Candidate(item) for item in sorted(items, key=lambda item: _rank(item, stood))]
     log_sizes = np.log([candidate.item.descriptor.length for candidate in ranked])
     nsvr = np.array([candidate.item.nsvr for candidate in ranked])
+    filled = np.array([candidate.filled for candidate in ranked])
     standing: list[int] = []
     copies: dict[str, list[str]] = {}
     for index, one in enumerate(ranked):
         others = np.array(standing, dtype=np.int64)
         factors = _unit_factors(log_sizes[others] - log_sizes[index])
         alike = np.abs(nsvr[others] - nsvr[index]) <= _DESCRIPTOR_TOLERANCE * nsvr[index]
-        alike &= np.isfinite(factors)
+        alike &= np.isfinite(factors) & (
+            np.abs(filled[others] - filled[index]) <= _FILLED_TOLERANCE
+        )
         for other, factor in zip(others[alike], factors[alike], strict=True):
             if _is_copy(one, ranked[other], float(factor), most_rms):
                 copies.setdefault(ranked[other].label, []).append(one.label)
@@ -75,6 +80,11 @@ class _Candidate:
     @property
     def label(self) -> str:
         return self.item.source.label
+
+    @property
+    def filled(self) -> float:
+        """Share of the volume within the outer surface that is no cavity [1]."""
+        return volume(self.item.mesh) / self.item.descriptor.length**3
 
     @cached_property
     def shape(self) -> Shape:

@@ -69,6 +69,14 @@ def test_what_stood_for_an_object_stands_again() -> None:
     assert set(find_copies(ITEMS[:4], {"b/mesh.stl"}, RMS)) == {"b/mesh.stl"}
 
 
+def test_a_hollow_object_is_another_than_a_solid_one() -> None:
+    inner = box(0.05, 0.05, 0.03)
+    inner.invert()
+    hollow = trimesh.util.concatenate([box(0.1, 0.07, 0.04), inner])
+    items = [ITEMS[0], measured("hollow.ply", hollow), measured("hollow.stl", hollow, 1000, 4)]
+    assert find_copies(items, (), RMS) == {"hollow.ply": ("hollow.stl",)}
+
+
 def test_a_threshold_of_nothing_joins_equal_bytes_alone() -> None:
     same = replace(ITEMS[0], source=replace(ITEMS[0].source, label="again.ply"))
     assert find_copies([*ITEMS[:3], same], (), 0.0) == {"again.ply": ("b/mesh.ply",)}

@@ -9,15 +9,17 @@ import pytest
 from pipeline.config import ObjectsConfig
 from pipeline.errors import MeshError
 from pipeline.geometry.catalogue import MeasuredObject, measure_object
-from pipeline.geometry.shape import surface_area, volume
+from pipeline.geometry.shape import outer_surface, surface_area, volume
 from pipeline.geometry.urdf_files import load_object_file
 from tests.geometry.corpus import corpus_cases
 from tests.geometry.corpus.case import Case, write
-from tests.geometry.corpus.page import PAGE, page
+from tests.geometry.corpus.folder_cases import folder_cases
+from tests.geometry.corpus.page import PAGE, objects_of, page
 
 CONFIG = ObjectsConfig(rescaled=False)
 CASES = {case.name: case for case in corpus_cases()}
 GOOD = [name for name, case in CASES.items() if case.solid is not None]
+FOLDERS = {case.name: case for case in folder_cases()}
 BAD = [name for name, case in CASES.items() if case.solid is None]
 
 
@@ -32,7 +34,8 @@ def test_a_file_is_read_right(tmp_path: Path, name: str) -> None:
     item = measured(case, tmp_path)
     assert case.solid is not None
     assert volume(item.mesh) == pytest.approx(case.solid.volume_m3, rel=case.tolerance)
-    assert surface_area(item.mesh) == pytest.approx(case.solid.area_m2, rel=case.tolerance)
+    outer = outer_surface(item.mesh)
+    assert surface_area(outer) == pytest.approx(case.solid.area_m2, rel=case.tolerance)
     assert item.nsvr == pytest.approx(case.solid.nsvr, rel=case.tolerance)
     assert case.recorded in " ".join(item.repairs)
 
@@ -45,6 +48,11 @@ def test_a_file_is_refused_with_the_true_reason(tmp_path: Path, name: str) -> No
     assert Path(name).name in refusal.value.what
     assert refusal.value.remedy
     assert ("truncated" in str(refusal.value)) == ("truncated" in case.refused)
+
+
+@pytest.mark.parametrize("name", FOLDERS)
+def test_a_folder_is_the_objects_that_it_holds(tmp_path: Path, name: str) -> None:
+    assert objects_of(FOLDERS[name], tmp_path) == FOLDERS[name].objects
 
 
 def test_the_page_of_the_corpus_is_up_to_date() -> None:

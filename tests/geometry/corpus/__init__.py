@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from tests.geometry.corpus import (
+    body_cases,
     gltf_cases,
     obj_cases,
     off_cases,
@@ -21,6 +22,7 @@ KINDS = {
     "PLY": ply_cases,
     "glTF": gltf_cases,
     "URDF": urdf_cases,
+    "bodies": body_cases,
 }
 
 

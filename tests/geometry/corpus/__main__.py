@@ -6,6 +6,7 @@ from pathlib import Path
 
 from tests.geometry.corpus import corpus_cases
 from tests.geometry.corpus.case import Case, write
+from tests.geometry.corpus.folder_cases import folder_cases, write_folder
 from tests.geometry.corpus.page import PAGE, page
 
 
@@ -30,10 +31,14 @@ def main(where: str) -> None:
         PAGE.write_text(page())
         return
     folder = Path(where)
-    answers = {}
+    answers: dict[str, dict[str, object]] = {}
     for case in corpus_cases():
         write(case, folder)
         answers[case.name] = answer(case)
+    for folder_case in folder_cases():
+        write_folder(folder_case, folder)
+        objects = {name: vars(known) for name, known in folder_case.objects.items()}
+        answers[folder_case.name] = {"what": folder_case.what, "objects": objects}
     (folder / "answers.json").write_text(json.dumps(answers, indent=1, ensure_ascii=False) + "\n")
 
 

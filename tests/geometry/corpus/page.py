@@ -3,13 +3,17 @@
 import tempfile
 from pathlib import Path
 
-from pipeline.config import ObjectsConfig
+from pipeline.config import ObjectsConfig, SplitConfig
 from pipeline.errors import MeshError
 from pipeline.geometry.catalogue import measure_object
-from pipeline.geometry.shape import surface_area, volume
-from pipeline.geometry.urdf_files import load_object_file
+from pipeline.geometry.mesh_folders import list_mesh_files
+from pipeline.geometry.plan import plan_catalogue
+from pipeline.geometry.settled import Settled
+from pipeline.geometry.shape import outer_surface, surface_area, volume
+from pipeline.geometry.urdf_files import load_object_file, standalone
 from tests.geometry.corpus import corpus
 from tests.geometry.corpus.case import Case, write
+from tests.geometry.corpus.folder_cases import FolderCase, Known, folder_cases, write_folder
 
 PAGE = Path(__file__).with_name("README.md")
 _HEAD = """# Mesh files that people bring
@@ -23,8 +27,8 @@ relative error of volume and of area). A refused file has the sentence that refu
 
 ## Why the readers are our own
 
-Measured on these files but for URDF and for those of several bodies (203 that are right, 72 to be
-refused), polygons cut as the library cuts them:
+Measured on these files but for URDF, folders and those of several bodies (203 that are right, 72
+to be refused), polygons cut as the library cuts them:
 
 | library | right | wrong in silence | refused | ends the process | takes what it should refuse |
 |-|-|-|-|-|-|
@@ -55,7 +59,38 @@ def page() -> str:
             if bad:
                 parts.append("\n| file | what it is | why it is refused |\n|-|-|-|")
                 parts += [_refused(case, folder) for case in bad]
+        parts.append("\n## Folders: one object in several files, names, units\n")
+        parts.append("| folder | what it is | object | file | unit | copies left out |")
+        parts.append("|-|-|-|-|-|-|")
+        for folder_case in folder_cases():
+            parts += _objects(folder_case, folder)
     return "\n".join(parts) + "\n"
+
+
+def _objects(case: FolderCase, place: Path) -> list[str]:
+    assert objects_of(case, place) == case.objects, case.name
+    return [
+        f"| `{case.name}` | {case.what} | `{name}` | `{known.source}` | {known.unit} "
+        f"| {', '.join(f'`{path}`' for path in known.copies) or 'none'} |"
+        for name, known in sorted(case.objects.items())
+    ]
+
+
+def objects_of(case: FolderCase, place: Path) -> dict[str, Known]:
+    """What a run makes of a folder."""
+    config, folder = ObjectsConfig(rescaled=False), write_folder(case, place)
+    items = [
+        measure_object(load_object_file(path, folder, path.name, config), config)
+        for path in standalone(list_mesh_files(folder), folder)
+    ]
+    plan = plan_catalogue(items, frozenset(), (), (config, SplitConfig()), 0, Settled("page"))
+    assert not plan.left_out, case.name
+    return {
+        item.source.name: Known(
+            item.source.label, item.source.unit, plan.copies.get(item.source.name, ())
+        )
+        for item in plan.taken
+    }
 
 
 def _read(case: Case, folder: Path) -> str:
@@ -65,7 +100,7 @@ def _read(case: Case, folder: Path) -> str:
     assert case.solid is not None
     worst = max(
         abs(volume(mesh) / case.solid.volume_m3 - 1),
-        abs(surface_area(mesh) / case.solid.area_m2 - 1),
+        abs(surface_area(outer_surface(mesh)) / case.solid.area_m2 - 1),
     )
     assert worst <= case.tolerance, (case.name, worst)
     return (

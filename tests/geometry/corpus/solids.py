@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -15,18 +15,20 @@ Outline = Sequence[tuple[float, float]]
 class Solid:
     """Corners, outward polygons over them, and what they enclose.
 
-    corners_m: (n, 3); polygons: corner indices of each, counter-clockwise from outside.
+    corners_m: (n, 3); polygons: corner indices of each, counter-clockwise from outside; area_m2: of
+    the outer surface; volume_m3: without the cavities.
     """
 
     corners_m: Float[np.ndarray, "n 3"]
     polygons: tuple[Polygon, ...]
     volume_m3: float
     area_m2: float
+    cavities_m3: float = 0.0
 
     @property
     def nsvr(self) -> float:
-        """Eq. (15)."""
-        return math.sqrt(self.area_m2) / math.cbrt(self.volume_m3)
+        """Eq. (15), by the outer surface."""
+        return math.sqrt(self.area_m2) / math.cbrt(self.volume_m3 + self.cavities_m3)
 
     @property
     def triangular(self) -> bool:
@@ -36,11 +38,11 @@ class Solid:
     def moved(self, by_m: Sequence[float]) -> "Solid":
         """The same solid elsewhere."""
         moved = self.corners_m + np.asarray(by_m, dtype=np.float64)
-        return Solid(moved, self.polygons, self.volume_m3, self.area_m2)
+        return replace(self, corners_m=moved)
 
     def turned(self, rotation: Float[np.ndarray, "3 3"]) -> "Solid":
         """The same solid, rotated about the origin."""
-        return Solid(self.corners_m @ rotation.T, self.polygons, self.volume_m3, self.area_m2)
+        return replace(self, corners_m=self.corners_m @ rotation.T)
 
     def scaled(self, factor: float) -> "Solid":
         """A similar solid."""
@@ -49,6 +51,7 @@ class Solid:
             self.polygons,
             self.volume_m3 * factor**3,
             self.area_m2 * factor**2,
+            self.cavities_m3 * factor**3,
         )
 
 
@@ -77,7 +80,21 @@ def prism(outline: Outline, height: float) -> Solid:
 def in_triangles(solid: Solid) -> Solid:
     """Convex polygons as fans. Right only for solids whose polygons are all convex."""
     fans = [(p[0], p[k], p[k + 1]) for p in solid.polygons for k in range(1, len(p) - 1)]
-    return Solid(solid.corners_m, tuple(fans), solid.volume_m3, solid.area_m2)
+    return replace(solid, polygons=tuple(fans))
+
+
+def together(
+    parts: Sequence[Solid], volume_m3: float, area_m2: float, cavities_m3: float = 0.0
+) -> Solid:
+    """Several solids in one file, and what they enclose together."""
+    starts = np.cumsum([0, *(len(part.corners_m) for part in parts)])
+    polygons = tuple(
+        tuple(int(start) + corner for corner in polygon)
+        for start, part in zip(starts, parts, strict=False)
+        for polygon in part.polygons
+    )
+    corners = np.concatenate([part.corners_m for part in parts])
+    return Solid(corners, polygons, volume_m3, area_m2, cavities_m3)
 
 
 def corners_of_triangles(solid: Solid) -> Float[np.ndarray, "m 3 3"]:
