@@ -29,7 +29,7 @@ ifeq (,$(strip $(WORKERS)))
 unexport WORKERS
 endif
 
-.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee holdout review report export predict real calibrate live docs lint fuzz regress clean FORCE
+.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee holdout folds review report export predict real calibrate live docs lint fuzz regress clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -116,6 +116,16 @@ holdout: .venv/.ready  ## NETWORK=released|file on MESH_DIR, nothing trained, to
 	@$(MAKE) --no-print-directory grasps RUN=$(RUN)/holdout
 	@$(PY) -m stages.evaluate --run $(RUN)/holdout
 	@$(PY) -m stages.holdout measure
+
+FOLDS ?= 5
+folds: .venv/.ready  ## cross-validation over families, FOLDS=k, to runs/<run>/folds
+	@FOLDS=$(FOLDS) $(PY) -m stages.folds prepare
+	@$(MAKE) --no-print-directory objects RUN=$(RUN)/folds
+	@FOLDS=$(FOLDS) $(PY) -m stages.folds deal
+	@for fold in $$(seq 0 $$(($(FOLDS) - 1))); do \
+	  $(PY) -m stages.scenes --run $(RUN)/folds/fold-$$fold && \
+	  $(PY) -m stages.grasps --run $(RUN)/folds/fold-$$fold || exit 1; done
+	@FOLDS=$(FOLDS) $(PY) -m stages.folds measure
 
 gallery: .venv/.ready  ## the nine levels on one sheet, to runs/<run>/gallery.png
 	@$(PY) -m stages.gallery

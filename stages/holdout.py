@@ -99,7 +99,14 @@ def measure(run: RunName = "default", runs_dir: RunsDir = RUNS_DIR) -> None:
         predict(samples.cloud, samples.cloud_mask, average_symmetries=averaging)
         for averaging in (False, True)
     )
-    errors = errors_by_object(names, samples.object_index, samples.quality, single, averaged)
+    errors = errors_by_object(
+        names,
+        samples.object_index,
+        samples.quality,
+        single,
+        averaged,
+        samples.proposal_weight,
+    )
     figures = {
         "network": json.loads((folder.path / NOTE).read_text())["name"],
         "grasps": len(samples),
@@ -159,15 +166,7 @@ def told_by_stages(folder: RunFolder, errors: list[ObjectError]) -> dict[str, An
         )
     return {
         "by_object": {
-            one.name: {
-                "shape_class": shape_class[one.name],
-                "grasps": one.grasps,
-                "mean_q": one.mean_quality,
-                "graspable": one.graspable,
-                "mae": one.mae,
-                "mae_averaged": one.mae_averaged,
-            }
-            for one in errors
+            one.name: {"shape_class": shape_class[one.name], **one.figures()} for one in errors
         },
         "meshes_left_out": dict(catalogue.refused),
         "clutters_left_out": read_summary(folder, "scenes").get("left_out", {}),

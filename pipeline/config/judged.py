@@ -1,4 +1,4 @@
-"""The configuration of a run within a run: what the referee judges, what a network is held to."""
+"""The configuration of a run within a run: of the referee, of a holdout, of folds."""
 
 from pipeline.config.scenes import ClutterCounts, ScenesConfig
 from pipeline.config.tree import RunConfig
@@ -66,5 +66,32 @@ def holdout_config(config: RunConfig) -> RunConfig:
             "evaluate": config.evaluate.model_copy(
                 update={"split": "test", "policies": wanted.policies}
             ),
+        }
+    )
+
+
+def folds_config(config: RunConfig, folds: int) -> RunConfig:
+    """A run's configuration for each of so many folds: all its objects make clutters of one split.
+
+    Labels are dealt over the folds. Stretched copies are left out.
+    """
+    wanted, families = config.folds, config.split.families
+    return config.model_copy(
+        update={
+            "objects": config.objects.model_copy(update={"limit": 0, "stretched_copies": 0}),
+            # The file lies beside the run's own run.toml.
+            "split": config.split.model_copy(
+                update={"families": f"../{families}" if families else "", "all_in_test": True}
+            ),
+            "scenes": config.scenes.model_copy(
+                update={
+                    "splits": ("test",),
+                    "impossible": "left out",
+                    "clutters_per_level": ClutterCounts(test=wanted.clutters_per_level),
+                }
+            ),
+            "grasps": config.grasps.model_copy(update={"count": -(-wanted.labelled // folds)}),
+            "network": wanted.network,
+            "train": config.train.model_copy(update={"epochs": wanted.epochs}),
         }
     )

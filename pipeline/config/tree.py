@@ -24,6 +24,7 @@ from pipeline.config.agreement import AgreementConfig
 from pipeline.config.cameras import CamerasConfig
 from pipeline.config.dataset import DatasetConfig
 from pipeline.config.evaluation import EvaluateConfig, RecordingConfig
+from pipeline.config.folds import FoldsConfig
 from pipeline.config.grasps import (
     CELL_SIDE,
     LARGEST_PAD_M,
@@ -84,6 +85,7 @@ class RunConfig(Section):
     agreement: AgreementConfig = AgreementConfig()
     evaluate: EvaluateConfig = EvaluateConfig()
     holdout: HoldoutConfig = HoldoutConfig()
+    folds: FoldsConfig = FoldsConfig()
     predict: PredictConfig = PredictConfig()
     recording: RecordingConfig = RecordingConfig()
     dataset: DatasetConfig = DatasetConfig()

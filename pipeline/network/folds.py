@@ -1,0 +1,192 @@
+"""Cross-validation: a network for each fold, and the errors of all folds together."""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from pipeline.config import RunConfig
+from pipeline.network.by_object import ObjectError, errors_by_object, interval_of_mean
+from pipeline.network.figures import mean_absolute_error
+from pipeline.network.inference import predict
+from pipeline.network.resuming import EpochMetrics
+from pipeline.network.samples import Samples, join_samples
+from pipeline.network.training import train
+
+Part = tuple[Sequence[str], Samples]  # names that a fold's samples point into, and the samples
+
+
+@dataclass(frozen=True, eq=False)
+class TestedFold:
+    """What a network says of the fold that it did not see.
+
+    Attributes
+    ----------
+    errors
+        Of each object.
+    quality
+        q of the n test samples, shape (n,).
+    single
+        q̂ of one prediction a grasp, shape (n,).
+    averaged
+        q̂ averaged over the symmetries, shape (n,).
+    facts
+        Numbers of samples, best epoch and errors of the fold.
+    """
+
+    __test__ = False  # not a test case, whatever its name
+
+    errors: list[ObjectError]
+    quality: Float[np.ndarray, " n"]
+    single: Float[np.ndarray, " n"]
+    averaged: Float[np.ndarray, " n"]
+    facts: dict[str, Any]
+
+
+def train_and_test(
+    config: RunConfig,
+    parts: Sequence[Part],
+    fold: int,
+    tested: Collection[str],
+    state_dir: Path,
+    on_epoch: Callable[[EpochMetrics], None],
+) -> TestedFold:
+    """Train on all folds but this and the next, choose the epoch on the next, predict this one.
+
+    Parameters
+    ----------
+    config
+        Sections network and train, and the seed.
+    parts
+        Every fold, at least three.
+    fold
+        The one that is tested.
+    tested
+        Names of the objects that are tested on.
+    state_dir
+        Folder of the resume state.
+    on_epoch
+        Called after each epoch.
+
+    Returns
+    -------
+    Errors and predictions on the fold.
+
+    Raises
+    ------
+    ArtifactError
+        The fold has no grasp of an object that is tested on.
+    """
+    names, samples = parts[fold]
+    chooses = (fold + 1) % len(parts)
+    train_set = join_samples(
+        [part for k, (_, part) in enumerate(parts) if k not in (fold, chooses)]
+    )
+    val_set = parts[chooses][1]
+    trained = train(
+        config.train,
+        config.network,
+        config.seed,
+        train_set.tensors,
+        val_set.tensors,
+        state_dir,
+        on_epoch,
+        show_progress=True,
+    )
+    of_tested = np.isin(np.array(names)[samples.object_index], sorted(tested))
+    samples = samples.take(np.flatnonzero(of_tested))
+    single, averaged = (
+        predict(
+            trained.network,
+            samples.cloud,
+            samples.cloud_mask,
+            config.train.batch_size,
+            config.train.threads,
+            average_symmetries=averaging,
+        )
+        for averaging in (False, True)
+    )
+    quality, weight = samples.quality, samples.proposal_weight
+    return TestedFold(
+        errors=errors_by_object(names, samples.object_index, quality, single, averaged, weight),
+        quality=quality,
+        single=single,
+        averaged=averaged,
+        facts={
+            "train": len(train_set),
+            "val": len(val_set),
+            "test": len(samples),
+            "best_epoch": trained.best_epoch,
+            "val_mae": trained.val_mae,
+            "mae_single": mean_absolute_error(single, quality),
+        },
+    )
+
+
+def figures_of_folds(
+    done: Sequence[TestedFold],
+    families: Mapping[str, str],
+    resamples: int,
+    rng: np.random.Generator,
+) -> dict[str, Any]:
+    """The headline over all folds, by fold and by object.
+
+    Parameters
+    ----------
+    done
+        Every fold, tested.
+    families
+        Family of each object.
+    resamples
+        Bootstrap samples over objects.
+    rng
+        Draws them.
+
+    Returns
+    -------
+    Figures by the names that the summary gives them.
+    """
+    errors = [(fold, one) for fold, found in enumerate(done) for one in found.errors]
+    quality = np.concatenate([found.quality for found in done])
+    single = np.concatenate([found.single for found in done])
+    averaged = np.concatenate([found.averaged for found in done])
+    macro = {
+        f"{whose}, {how}": _mean([one for _, one in errors if taken(one)], value, resamples, rng)
+        for whose, taken in (
+            ("objects that can be gripped", lambda one: one.graspable),
+            ("all objects", lambda one: True),
+        )
+        for how, value in (
+            ("labels balanced over q", lambda one: one.mae),
+            ("grasps as proposed", lambda one: one.mae_as_proposed),
+        )
+    }
+    return {
+        "folds": len(done),
+        "objects": len(errors),
+        "families": len({families[one.name] for _, one in errors}),
+        "grasps": len(quality),
+        "mae": mean_absolute_error(averaged, quality),
+        "mae_single": mean_absolute_error(single, quality),
+        "macro": macro,
+        "by_object": {one.name: {"fold": fold, **one.figures()} for fold, one in errors},
+        "by_fold": {str(fold): found.facts for fold, found in enumerate(done)},
+    }
+
+
+def _mean(
+    errors: Sequence[ObjectError],
+    value: Callable[[ObjectError], float | None],
+    resamples: int,
+    rng: np.random.Generator,
+) -> dict[str, Any]:
+    """Mean of one error an object, over those that have it, with its interval."""
+    values = [found for one in errors if (found := value(one)) is not None]
+    return {
+        "objects": len(values),
+        "mae": float(np.mean(values)) if values else None,
+        "interval_95": interval_of_mean(values, resamples, rng),
+    }

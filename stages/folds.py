@@ -1,0 +1,107 @@
+"""`make folds`: cross-validation over families, so that every object is tested once.
+
+In ``runs/<run>/folds``: the objects of the run, dealt to folds by family; ``fold-<k>`` with the
+clutters and grasps of one fold's objects alone; a network for each fold, trained on the others, its
+best epoch chosen on the next one; folds.summary.json and .md. Embedded objects beside meshes are
+dealt too and never tested on.
+"""
+
+import json
+import sys
+import time
+from collections.abc import Collection
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from loguru import logger
+
+from pipeline.artifacts import ArtifactWriter, publish_bytes, read_provenance
+from pipeline.config import RunConfig, load_run_config
+from pipeline.config.judged import folds_config
+from pipeline.config.written import as_toml
+from pipeline.execution import RunFolder, generator, run_command
+from pipeline.geometry.folds import deal_families
+from pipeline.geometry.parametric import PARAMETRIC_OBJECTS
+from pipeline.messages.objects import TOPIC, object_message, read_objects
+from pipeline.network.folds import figures_of_folds, train_and_test
+from pipeline.reporting.folds import as_markdown
+from stages.graph import RUNS_DIR
+from stages.holdout import labelled
+from stages.train import print_epoch
+
+NAME = "folds"
+FEWEST_FOLDS = 3  # one to test on, one to choose the epoch on, one to train on
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+RunName = Annotated[str, typer.Option(envvar="RUN", help="name of the run")]
+RunsDir = Annotated[Path, typer.Option(help="folder of all runs")]
+Folds = Annotated[int, typer.Option(envvar="FOLDS", min=FEWEST_FOLDS, help="how many folds")]
+
+
+def fold_folder(folder: RunFolder, fold: int) -> RunFolder:
+    """The run of one fold's clutters and grasps."""
+    return RunFolder(folder.path / f"fold-{fold}")
+
+
+@app.command()
+def prepare(run: RunName = "default", folds: Folds = 5, runs_dir: RunsDir = RUNS_DIR) -> None:
+    """Write the run.toml of the objects that are dealt."""
+    own = RunFolder(runs_dir / run).config
+    config = folds_config(load_run_config(own) if own.is_file() else RunConfig(), folds)
+    publish_bytes(RunFolder(runs_dir / run / NAME).config, as_toml(config).encode())
+
+
+@app.command()
+def deal(run: RunName = "default", folds: Folds = 5, runs_dir: RunsDir = RUNS_DIR) -> None:
+    """Give each fold a run of its own, with its objects alone."""
+    folder = RunFolder(runs_dir / run / NAME)
+    objects = {name: item for name, (item, _) in read_objects(folder.artifact("objects")).items()}
+    families = {name: item.family for name, item in objects.items()}
+    classes = {name: item.shape_class for name, item in objects.items()}
+    seed = load_run_config(folder.config).seed
+    fold_of = deal_families(families, classes, tested(objects), folds, seed)
+    made_from = read_provenance(folder.artifact("objects"))
+    for fold in range(folds):
+        own = fold_folder(folder, fold)
+        publish_bytes(own.config, folder.config.read_bytes())
+        key = f"{made_from.key}, fold {fold} of {folds}"
+        with ArtifactWriter(own.artifact("objects"), replace(made_from, key=key)) as artifact:
+            taken = [name for name in objects if fold_of[name] == fold]
+            for index, name in enumerate(taken):
+                artifact.write(TOPIC, object_message(objects[name], "test"), log_time_ns=index)
+        logger.info("folds: fold {} holds {}", fold, ", ".join(taken))
+
+
+def tested(names: Collection[str]) -> set[str]:
+    """The meshes; the embedded objects where there is no mesh."""
+    return {name for name in names if name not in PARAMETRIC_OBJECTS} or set(names)
+
+
+@app.command()
+def measure(run: RunName = "default", folds: Folds = 5, runs_dir: RunsDir = RUNS_DIR) -> None:
+    """Train a network for each fold and test it there."""
+    began = time.perf_counter()
+    folder = RunFolder(runs_dir / run / NAME)
+    config = load_run_config(folder.config)
+    objects = read_objects(folder.artifact("objects"))
+    families = {name: item.family for name, (item, _) in objects.items()}
+    parts = [labelled(fold_folder(folder, fold)) for fold in range(folds)]
+    done = []
+    for fold in range(folds):
+        logger.info("folds: fold {} of {}", fold, folds)
+        state = fold_folder(folder, fold).state("train")
+        done.append(train_and_test(config, parts, fold, tested(objects), state, print_epoch))
+    rng = generator(config.seed, NAME)
+    figures = figures_of_folds(done, families, config.folds.resamples, rng) | {
+        "layers": config.network.layers,
+        "wall_time_s": time.perf_counter() - began,
+    }
+    text, summary = as_markdown(figures), json.dumps(figures, indent=1) + "\n"
+    publish_bytes(folder.summary(NAME), summary.encode())
+    publish_bytes(folder.path / f"{NAME}.md", text.encode())
+    sys.stdout.write(text)
+
+
+if __name__ == "__main__":
+    run_command(app)
