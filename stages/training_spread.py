@@ -81,7 +81,7 @@ def trained(labelled: RunFolder, path: Path, seed: int, workers: int) -> RunFold
 
 def with_seed(text: str, seed: int) -> str:
     """A configuration with another seed, and one policy judged."""
-    lines = [line for line in text.splitlines() if not line.startswith("seed")]
+    lines = [line for line in text.splitlines() if not line.startswith(("seed", "policies"))]
     at = lines.index("[evaluate]") + 1
     lines.insert(at, 'policies = ["closed-loop"]')
     return "\n".join([f"seed = {seed}", *lines, ""])

@@ -16,7 +16,7 @@ class AgreementConfig(Section):
     labelled: int = Field(9000, ge=1, description="grasps labelled, to choose from")
     grasps: int = Field(2400, ge=1, description="grasps judged, spread over q and objects")
     varied: int = Field(
-        200, ge=0, description="of them, judged again with each figure halved and doubled"
+        100, ge=0, description="of them, judged again with each figure halved and doubled"
     )
     fitted: int = Field(
         600, ge=10, description="other grasps that the label on measured clouds is fitted to"

@@ -2,13 +2,13 @@
 
 from typing import ClassVar, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from pipeline.config.policy import PolicyConfig
 from pipeline.config.section import LengthInMetres, ScaledSection, Section
 
 RobotName = Literal["floating", "iiwa14"]
-PolicyName = Literal["closed-loop", "uncorrected", "open-loop", "geometric"]
+PolicyName = Literal["closed-loop", "uncorrected", "one-seal", "open-loop", "geometric"]
 
 
 class SuctionConfig(Section):
@@ -35,6 +35,28 @@ class LiftConfig(ScaledSection):
     shake_m: float = Field(0.005, ge=0, description="amplitude of the shake before that [m]")
     shake_hz: float = Field(2.0, gt=0, description="frequency of the shake [Hz]")
     shake_s: float = Field(0.5, ge=0, description="time of the shake [s]")
+
+
+class TransportConfig(ScaledSection):
+    """What a robot does to an object that it has lifted: there and back, faster each time."""
+
+    way_m: ClassVar[LengthInMetres] = LengthInMetres()
+
+    accelerations_m_s2: tuple[float, ...] = Field(
+        (1.0, 3.0, 5.0),
+        description="of each time, braking as hard; what falls in any is lost; () is none [m/s2]",
+    )
+    way_rg: float = Field(
+        8.0, gt=0, description="how far to the side; less where the arm cannot [r_G]"
+    )
+    rest_s: float = Field(0.3, gt=0, description="time of standing still after each time [s]")
+
+    @field_validator("accelerations_m_s2")
+    @classmethod
+    def _grow(cls, values: tuple[float, ...]) -> tuple[float, ...]:
+        if any(value <= 0 for value in values) or list(values) != sorted(set(values)):
+            raise ValueError("accelerations_m_s2 must grow from over 0")
+        return values
 
 
 class HandConfig(ScaledSection):
@@ -116,7 +138,9 @@ class EvaluateConfig(Section):
         "test", description="whose clutters are picked; choices are made on val"
     )
     policies: tuple[PolicyName, ...] = Field(
-        ("closed-loop", "open-loop", "geometric"), min_length=1, description="the first is judged"
+        ("closed-loop", "uncorrected", "one-seal", "open-loop", "geometric"),
+        min_length=1,
+        description="the first is judged",
     )
     settle_s: float = Field(
         1.5, ge=0, description="time that a clutter comes to rest before the first attempt [s]"
@@ -127,6 +151,7 @@ class EvaluateConfig(Section):
     failures_per_clutter: int = Field(5, ge=1, description="failures in a row that end a clutter")
     suction: SuctionConfig = SuctionConfig()
     lift: LiftConfig = LiftConfig()
+    transport: TransportConfig = TransportConfig()
     hand: HandConfig = HandConfig()
     arm: ArmConfig = ArmConfig()
     policy: PolicyConfig = PolicyConfig()

@@ -73,7 +73,7 @@ class UnseenConfig(ScaledSection):
 
 
 class PickerConfig(ScaledSection):
-    """The geometric picker: the flattest patch among those at the top."""
+    """The geometric picker: the flattest place for the pad among those at the top."""
 
     band_m: ClassVar[LengthInMetres] = LengthInMetres()
     roughness_m: ClassVar[LengthInMetres] = LengthInMetres()
@@ -83,7 +83,7 @@ class PickerConfig(ScaledSection):
         0.6, ge=0, description="candidates this far under the highest count as at the top [r_G]"
     )
     roughness_rg: float = Field(
-        0.04, gt=0, description="roughness at which flatness has fallen to 1/e [r_G]"
+        0.04, gt=0, description="roughness under the pad where flatness has fallen to 1/e [r_G]"
     )
     fall_rg: float = Field(
         4.0, gt=0, description="depth under the highest at which worth has fallen to 1/e [r_G]"
@@ -162,7 +162,7 @@ class PolicyConfig(ScaledSection):
         0.1, ge=0, le=1, description="rise of q-hat that a correction must promise [1]"
     )
     regrasps: int = Field(
-        2, ge=0, description="how often an attempt grasps elsewhere what did not hold in the tug"
+        2, ge=0, description="how often an attempt of any policy seals again what the tug lost"
     )
     regrasp_quality: float = Field(
         0.0, ge=0, le=1, description="least q-hat of another place after a seal that failed [1]"

@@ -58,6 +58,7 @@ SCALED = (
     ("sensing",),
     ("grasps",),
     ("evaluate", "lift"),
+    ("evaluate", "transport"),
     ("evaluate", "hand"),
     ("evaluate", "policy"),
     ("evaluate", "policy", "motion"),

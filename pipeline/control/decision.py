@@ -24,6 +24,7 @@ class Cause(StrEnum):
     NO_SEAL = "no seal"
     LOST_IN_LIFT = "lost in lift"
     LOST_IN_SHAKE = "lost in shake"
+    LOST_IN_TRANSPORT = "lost in transport"
     OFF_THE_TABLE = "object off the table"
 
 
@@ -41,15 +42,18 @@ class Strategy:
         Whether the wrist's camera takes pictures before the choice.
     corrects
         Whether it takes pictures during the approach and the aim is corrected by them.
+    seals_again
+        Whether, after a tug that does not hold, another place is sealed in the same attempt.
     feels
-        Whether the measured wrench is used: after a tug that does not hold, the object is grasped
-        elsewhere, nearer to the load's centre where one was measured, and the lift is trimmed.
+        Whether the measured wrench says where: nearer to the load's centre where one was measured;
+        and whether the lift is trimmed by it.
     """
 
     name: PolicyName
     ranking: Ranking
     several_views: bool
     corrects: bool
+    seals_again: bool
     feels: bool
 
 
@@ -73,6 +77,10 @@ class Decision:
         How often the aim was corrected by a picture.
     regrasps
         How often the object was grasped again after a tug that did not hold.
+    seals
+        How often the vacuum was switched on.
+    carried_m_s2
+        Largest acceleration of the transport that the object bore; 0 for none.
     failed_contacts_m
         Contacts in WCS that did not hold in the first tug [m], each of shape (3,).
     pictures
@@ -86,5 +94,7 @@ class Decision:
     world_from_contact: Float[np.ndarray, "4 4"] = field(default_factory=lambda: np.eye(4))
     corrections: int = 0
     regrasps: int = 0
+    seals: int = 0
+    carried_m_s2: float = 0.0
     failed_contacts_m: list[Float[np.ndarray, " 3"]] = field(default_factory=list)
     pictures: list[DepthPicture] = field(default_factory=list)

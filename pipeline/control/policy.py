@@ -71,7 +71,7 @@ class Attempt:
         self._local = LocalPhase(strategy.ranking, config, normal_radius_m, rng)
         self._new_choices_left = config.policy.new_choices
         self._retargets_left = config.policy.retargets if strategy.corrects else 0
-        self._regrasps_left = config.policy.regrasps if strategy.feels else 0
+        self._regrasps_left = config.policy.regrasps if strategy.seals_again else 0
         self._felt_for = False
         self.decision = Decision()
 
@@ -82,6 +82,7 @@ class Attempt:
             *self._to_the_seal(),
             (State.LIFT, self._lift),
             (State.SHAKE, self._shake),
+            (State.TRANSPORT, self._transport),
         )
         self._robot.enter(State.DONE)
         self.decision.cause = cause or Cause.LIFTED
@@ -206,6 +207,7 @@ class Attempt:
         that. Where nothing pulled, or nothing is nearer: try the next best place.
         """
         self._robot.vacuum(on=True)
+        self.decision.seals += 1
         start = self._robot.pose()
         readings = self._raise(start, self._policy.tug_m)
         if self._monitor.holds(readings[-1]):
@@ -223,7 +225,7 @@ class Attempt:
 
     def _aim_nearer(self, felt: Reading) -> bool:
         """Whether there is a contact nearer to where the load hangs; then aim there."""
-        if not self._monitor.holds(felt):
+        if not (self._strategy.feels and self._monitor.holds(felt)):
             return False
         place = load_place_m(felt, self._config.hand.length_m)
         lever_m = float(np.linalg.norm(place - felt.world_from_gripper[:2, 3]))
@@ -265,6 +267,14 @@ class Attempt:
     def _shake(self) -> Cause | None:
         reading = self._robot.shake()
         return None if self._monitor.holds(reading) else Cause.LOST_IN_SHAKE
+
+    def _transport(self) -> Cause | None:
+        """Aside and back at each acceleration, one after the other."""
+        for acceleration_m_s2 in self._config.transport.accelerations_m_s2:
+            if not self._monitor.holds(self._robot.carry(acceleration_m_s2)):
+                return Cause.LOST_IN_TRANSPORT
+            self.decision.carried_m_s2 = acceleration_m_s2
+        return None
 
     def _travel(self, pose: Float[np.ndarray, "4 4"]) -> Cause | None:
         """Through free space to a pose."""

@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 from jaxtyping import Bool, Float
 
-from pipeline.config.grasps import SensingConfig
+from pipeline.config.grasps import PadConfig, SensingConfig
 from pipeline.config.policy import PickerConfig, PolicyConfig
 from pipeline.control.candidates import Candidates
 from pipeline.control.cloud import DepthPicture
@@ -72,23 +72,45 @@ def smooth_quality(
 
 
 class GeometricRanking:
-    """The geometric picker: the flattest patch among those at the highest point.
+    """The geometric picker: the flattest place for the pad among those at the highest point.
 
-    exp(-roughness over `roughness_m`) for candidates within `band_m` of the highest one, less than
-    any of these for all others, the higher the better.
+    Flatness is exp(-roughness over `roughness_m`) times the share that is seen of the pad's sealing
+    region, r_v; roughness is the root mean square height of that region about its mean, along the
+    approach. What is within `band_m` of the highest candidate ranks by it, all others below these,
+    the higher the better.
     """
 
-    def __init__(self, config: PickerConfig) -> None:
+    def __init__(self, config: PickerConfig, sensing: SensingConfig, pad: PadConfig) -> None:
         self._config = config
+        self._sensing = sensing
+        self._radius_m = pad.radius_m
+        middle = (np.arange(sensing.grid_cells) + 0.5) / sensing.grid_cells - 0.5
+        away_m = sensing.grid_side_m * np.hypot(middle[:, None], middle[None])
+        self._region = away_m <= pad.seal_radius_m
 
     def __call__(
         self, pictures: Sequence[DepthPicture], candidates: Candidates, /
     ) -> Float[np.ndarray, " k"]:
-        """A value in [0, 1] for every candidate; pictures are not looked at."""
+        """A value in [0, 1] for every candidate."""
         height = candidates.world_from_contact[:, 2, 3]
         below = height.max() - height
-        flatness = np.exp(-candidates.roughness_m / self._config.roughness_m)
+        views = [(picture.depth_m, picture.camera) for picture in pictures]
+        cloud, seen = merged_sub_clouds(
+            views, candidates.world_from_contact, self._sensing, self._radius_m
+        )
+        flatness = self._flatness(self._radius_m * cloud[..., 2].astype(np.float64), seen)
         at_the_top = below <= self._config.band_m
         return np.where(
             at_the_top, 0.5 + 0.5 * flatness, 0.5 * np.exp(-below / self._config.fall_m)
         )
+
+    def _flatness(
+        self, height_m: Float[np.ndarray, "k g g"], seen: Bool[np.ndarray, "k g g"]
+    ) -> Float[np.ndarray, " k"]:
+        """Of the sealing region, in [0, 1]; 0 where nothing of it is seen."""
+        heights, there = height_m[:, self._region], seen[:, self._region]
+        count = np.maximum(there.sum(axis=1), 1)
+        mean = (heights * there).sum(axis=1) / count
+        roughness_m = np.sqrt(((heights - mean[:, None]) ** 2 * there).sum(axis=1) / count)
+        share = there.mean(axis=1)
+        return np.asarray(share * np.exp(-roughness_m / self._config.roughness_m))

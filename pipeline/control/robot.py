@@ -20,6 +20,7 @@ class State(StrEnum):
     SEAL = "seal"
     LIFT = "lift"
     SHAKE = "shake"
+    TRANSPORT = "transport"
     DONE = "done"
 
 
@@ -91,4 +92,8 @@ class Robot(Protocol):
 
     def shake(self) -> Reading:
         """Move side to side, then stop, as `LiftConfig` says; return the mean wrench at rest."""
+        ...
+
+    def carry(self, acceleration_m_s2: float) -> Reading:
+        """Go aside and back, then stop, as `TransportConfig` says; the mean wrench at rest."""
         ...

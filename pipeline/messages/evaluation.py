@@ -70,6 +70,8 @@ def attempt_message(
         candidate_quality=to_tensor(decision.quality.astype(np.float32)),
         corrections=decision.corrections,
         regrasps=decision.regrasps,
+        seals=decision.seals,
+        carried_m_s2=decision.carried_m_s2,
         pictures=[picture_message(picture) for picture in decision.pictures],
         **{name: to_tensor(np.asarray(array, np.float64)) for name, array in arrays.items()},
     )

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pipeline.config.evaluation import PolicyName
-from pipeline.control.success import Outcome, advantage, success_rate
+from pipeline.control.success import Outcome, advantage, bootstrap_interval, success_rate
 from pipeline.world.scene import ClutterScene
 from schemas.softgrip.v1.evaluation_pb2 import Attempt, Comparison, LevelResult
 
@@ -85,6 +85,17 @@ def _result(
     lifted = sum(made.outcome == "lifted" for made in mine)
     by_scene = Counter(made.scene_id for made in mine if made.outcome == "lifted")
     rate, low, high = success_rate(lifted, len(mine))
+    around = bootstrap_interval(
+        [made.outcome == "lifted" for made in mine],
+        [made.scene_id for made in mine],
+        [made.target for made in mine],
+    )
+    carried = Counter(
+        f"{level:g}"
+        for level in sorted({made.carried_m_s2 for made in mine if made.carried_m_s2 > 0})
+        for made in mine
+        if made.carried_m_s2 >= level
+    )
     time_s = sum(made.duration_s for made in mine)
     return LevelResult(
         policy=policy,
@@ -95,11 +106,14 @@ def _result(
         clutters=len(scenes),
         cleared=sum(by_scene[scene.scene_id] == len(scene.objects) for scene in scenes),
         success_rate=rate,
-        interval_low=low,
-        interval_high=high,
+        interval_low=min(low, around[0]),
+        interval_high=max(high, around[1]),
         failures=Counter(made.cause for made in mine if made.outcome != "lifted"),
         seconds_a_pick=time_s / lifted if lifted else 0.0,
         picks_an_hour=3600 * lifted / time_s if time_s else 0.0,
+        seals=sum(made.seals for made in mine),
+        lifted_at_first_seal=sum(made.outcome == "lifted" and made.seals == 1 for made in mine),
+        carried=carried,
     )
 
 
@@ -137,4 +151,7 @@ def _figures(result: LevelResult) -> dict[str, object]:
         "failures": dict(sorted(result.failures.items())),
         "seconds_a_pick": round(result.seconds_a_pick, 3),
         "picks_an_hour": round(result.picks_an_hour, 1),
+        "success_at_first_seal": result.lifted_at_first_seal / max(result.attempts, 1),
+        "seals_an_object": result.seals / result.lifted if result.lifted else None,
+        "carried": dict(sorted(result.carried.items(), key=lambda one: float(one[0]))),
     }

@@ -44,7 +44,7 @@ TIMELINE = "frame"
 SHOWN_CANDIDATES = 60  # the best of them: more hide the scene
 APPROACH_M = 0.025  # length of the arrows that candidates are drawn as
 CAMERAS = ("static_0", "wrist")
-STATES = ("observe", "pregrasp", "approach", "seal", "lift", "shake", "done")
+STATES = ("observe", "pregrasp", "approach", "seal", "lift", "shake", "transport", "done")
 
 
 def draw_evaluate(stage: FinishedStage, figures: Mapping[str, Any]) -> None:
@@ -253,8 +253,9 @@ def _facts(made: Attempt) -> str:
         f"**{made.policy}: {made.outcome}{': ' + made.cause if made.cause else ''}** "
         f"({made.scene_id}, attempt {made.attempt})\n\n"
         f"target {made.target or 'none'}; {made.candidates} candidates, "
-        f"{made.corrections} corrections, {made.regrasps} regrasps; "
+        f"{made.corrections} corrections, {made.seals} seals; "
         f"predicted q {made.predicted_quality:.3f}, "
         f"reached q {made.reached_quality:.3f}, p {made.seal_pressure:.3f}; "
-        f"lifted {1e3 * made.lifted_height_m:.0f} mm in {made.duration_s:.1f} s\n"
+        f"lifted {1e3 * made.lifted_height_m:.0f} mm in {made.duration_s:.1f} s, "
+        f"carried at up to {made.carried_m_s2:g} m/s²\n"
     )

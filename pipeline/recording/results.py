@@ -28,13 +28,15 @@ def results_markdown(
     parts = [_policy_table(p.policy, [r for r in levels if r.policy == p.policy]) for p in policies]
     rows = "\n".join(
         f"| {p.policy} | {_rate(p)} | {p.lifted} / {p.objects} | {p.cleared} / {p.clutters} "
-        f"| {p.seconds_a_pick:.1f} | {p.picks_an_hour:.0f} |"
+        f"| {_at_first(p)} | {_seals_an_object(p)} | {p.seconds_a_pick:.1f} "
+        f"| {p.picks_an_hour:.0f} | {_carried(p)} |"
         for p in policies
     )
     parts.append(
         "### All levels\n\n"
         "| policy | success (95 % interval) | objects lifted | clutters cleared "
-        f"| seconds a pick | picks an hour |\n|-|-|-|-|-|-|\n{rows}\n"
+        "| success at the first seal | seals an object | seconds a pick | picks an hour "
+        f"| attempts that bore a transport |\n|-|-|-|-|-|-|-|-|-|\n{rows}\n"
     )
     if comparisons:
         parts.append(_comparison_table(comparisons))
@@ -64,6 +66,19 @@ def _comparison_table(comparisons: Sequence[Comparison]) -> str:
         "| baseline | success, mean over clutters | baseline's | clutters "
         f"| p, paired by clutter | p, Fisher |\n|-|-|-|-|-|-|\n{rows}\n"
     )
+
+
+def _at_first(r: LevelResult) -> str:
+    return f"{100 * r.lifted_at_first_seal / max(r.attempts, 1):.0f} %"
+
+
+def _seals_an_object(r: LevelResult) -> str:
+    return f"{r.seals / r.lifted:.2f}" if r.lifted else "none lifted"
+
+
+def _carried(r: LevelResult) -> str:
+    found = sorted(r.carried.items(), key=lambda one: float(one[0]))
+    return ", ".join(f"{count} at {level} m/s²" for level, count in found) or "none"
 
 
 def _rate(r: LevelResult) -> str:

@@ -84,6 +84,26 @@ class Hold:
             return np.inf
         return float(found.x[-1]) if found.status == OPTIMAL else self._scale_by_halving(load)
 
+    def largest_common_scale(self, loads: Float[np.ndarray, "n 6"]) -> float:
+        """The largest t for which t times each of several loads is borne by itself.
+
+        What is borne is convex: a load that is borne at the least t so far needs no program.
+
+        Parameters
+        ----------
+        loads
+            As in `bears`, a load a row, shape (n, 6).
+
+        Returns
+        -------
+        The least of their `largest_scale`.
+        """
+        least = np.inf
+        for load in loads:
+            if not (np.isfinite(least) and self.bears(least * load)):
+                least = min(least, self.largest_scale(load))
+        return float(least)
+
     def _scale_by_halving(self, load: Float[np.ndarray, " 6"]) -> float:
         """The same by checking loads, where the linear program meets numerical difficulties."""
         if not self.bears(np.zeros(6)):

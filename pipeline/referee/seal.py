@@ -166,7 +166,7 @@ def weight_borne_n(
         GRAVITY_M_S2 + config.lift_acceleration_m_s2,
         config.side_acceleration_m_s2,
     )
-    return GRAVITY_M_S2 * min(found.hold.largest_scale(load) for load in loads)
+    return GRAVITY_M_S2 * found.hold.largest_common_scale(loads)
 
 
 def straight_pull_n(found: Seal) -> float:

@@ -5,6 +5,7 @@ because a real pad would deform: the gripper stops where the pad, at the pose re
 touches the true surfaces.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -56,6 +57,15 @@ class Sample:
     wrench: Float[np.ndarray, " 6"]
     state: str
     joints_rad: Float[np.ndarray, " joints"]
+
+
+def there_and_back(leg: float) -> float:
+    """Share of a way at a time in legs, each of full acceleration and then full braking.
+
+    leg : 0 at the start, 1 at the far end, from 2 on back at the start.
+    """
+    left = min(abs(leg - 1.0), 1.0)
+    return 1.0 - 2.0 * left**2 if left < 0.5 else 2.0 * (1.0 - left) ** 2
 
 
 class SuctionGripper:
@@ -205,6 +215,41 @@ class SuctionGripper:
             if number % self._steps == 0:
                 self._sample(self._at_base(loads[-1]))
         return self._reading(np.mean(loads[-self._steps :], axis=0), 0.0, True, touched=False)
+
+    def carry(self, acceleration_m_s2: float) -> Reading:
+        """Aside and back at an acceleration, braking as hard; the wrench is the mean while still.
+
+        The way is towards the table's middle, or wherever else the mover can go.
+        """
+        transport, dt = self._config.evaluate.transport, self._world.timestep
+        start, aside_m = self._goal.copy(), self._way_aside_m()
+        leg_s = 2 * math.sqrt(max(float(np.linalg.norm(aside_m)), _ARRIVED_M) / acceleration_m_s2)
+        moving, resting = math.ceil(2 * leg_s / dt), math.ceil(transport.rest_s / dt)
+        loads = []
+        for number in range(1, moving + resting + 1):
+            self._goal = start.copy()
+            self._goal[:3, 3] += there_and_back(number * dt / leg_s) * aside_m
+            loads.append(self._physics_step()[0])
+            if number % self._steps == 0:
+                self._sample(self._at_base(loads[-1]))
+        return self._reading(np.mean(loads[-self._steps :], axis=0), 0.0, True, touched=False)
+
+    def _way_aside_m(self) -> Float[np.ndarray, " 3"]:
+        """A level way that the mover can go, as long as the configuration's where possible."""
+        place, way_m = self._goal[:3, 3], self._config.evaluate.transport.way_m
+        inwards = -place * [1.0, 1.0, 0.0]
+        far = float(np.linalg.norm(inwards))
+        ways = [inwards / far] if far > _ARRIVED_M else []
+        ways += [
+            np.array([x, y, 0.0]) for x, y in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
+        ]
+        for length_m in (way_m, way_m / 2, way_m / 4):
+            for way in ways:
+                end = self._goal.copy()
+                end[:3, 3] += length_m * way
+                if self.reachable(end):
+                    return np.asarray(length_m * way)
+        return np.zeros(3)
 
     def lifted_m(self) -> float:
         """Height of the held object above where it was sealed [m]; 0 where none is held."""

@@ -66,9 +66,13 @@ def build_strategy(name: PolicyName, predict: Predict, config: RunConfig) -> Str
     """Build one of the policies that are compared.
 
     - closed-loop: takes several views, corrects its aim on the way, and reacts to the wrench.
-    - uncorrected: the same without corrections and without reacting to the wrench.
-    - open-loop: executes the pose that the network rates best on the first picture.
-    - geometric: executes the flattest place at the highest point of the first picture.
+    - uncorrected: the same without corrections.
+    - one-seal: the same as closed-loop without a second seal.
+    - open-loop: executes what the network rates best on the first picture.
+    - geometric: executes the flattest place for the pad at the highest point, of as many views as
+      the closed loop has.
+
+    Each but one-seal may seal as often in an attempt.
 
     Parameters
     ----------
@@ -90,11 +94,19 @@ def build_strategy(name: PolicyName, predict: Predict, config: RunConfig) -> Str
         config.evaluate.policy,
     )
     if name == "geometric":
-        geometric = GeometricRanking(config.evaluate.policy.picker)
-        return Strategy(name, geometric, several_views=False, corrects=False, feels=False)
-    closed = name == "closed-loop"
-    views = name in ("closed-loop", "uncorrected")
-    return Strategy(name, network, several_views=views, corrects=closed, feels=closed)
+        picker = GeometricRanking(config.evaluate.policy.picker, config.sensing, config.gripper.pad)
+        return Strategy(
+            name, picker, several_views=True, corrects=False, seals_again=True, feels=False
+        )
+    loop = name != "open-loop"
+    return Strategy(
+        name,
+        network,
+        several_views=loop,
+        corrects=loop and name != "uncorrected",
+        seals_again=name != "one-seal",
+        feels=loop,
+    )
 
 
 def build_mover(world: sapien.Scene, config: RunConfig) -> Mover:

@@ -32,9 +32,8 @@ REAL = os.environ.get("REAL_FRAMES_DIR")
 
 
 def proposed(frames: list[Frame], config: RunConfig = CONFIG) -> Proposals:
-    return propose_grasps(
-        frames, GeometricRanking(config.evaluate.policy.picker), config, np.random.default_rng(0)
-    )
+    ranking = GeometricRanking(config.evaluate.policy.picker, config.sensing, config.gripper.pad)
+    return propose_grasps(frames, ranking, config, np.random.default_rng(0))
 
 
 def test_the_best_grasp_lies_on_the_boxs_top() -> None:

@@ -105,6 +105,9 @@ class FakeRobot:
     def shake(self) -> Reading:
         return self.step(self._pose, 1.0)
 
+    def carry(self, acceleration_m_s2: float) -> Reading:
+        return self.step(self._pose, 1.0)
+
 
 class HeavyRobot(FakeRobot):
     """Its object hangs below a place; held with more than ``lever_m`` beside it, it breaks away."""

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pipeline.config import EvaluateConfig
+from pipeline.config import EvaluateConfig, RunConfig
 from pipeline.control.candidates import Candidates, candidates_at, sample_near
 from pipeline.control.clearance import free_of_collision
 from pipeline.control.cloud import Cloud, merged_cloud
@@ -73,13 +73,22 @@ def test_a_post_beside_the_stem_is_in_the_way_of_one_pose_alone() -> None:
     assert free_of_collision(poses, low, CONFIG.hand).all()
 
 
-def test_the_geometric_picker_wants_the_flattest_at_the_top() -> None:
-    places = np.array([[0, 0, 0.10], [0, 0, 0.098], [0, 0, 0.05]])
-    poses = contact_frames(places, np.tile([0, 0, 1.0], (3, 1)), np.zeros(3))
-    value = GeometricRanking(CONFIG.policy.picker)(
-        [], Candidates(poses, np.array([0.002, 0.0005, 0.0]))
-    )
-    assert np.argsort(-value).tolist() == [1, 0, 2]
+def test_the_geometric_picker_wants_the_pad_on_the_flattest_at_the_top() -> None:
+    """A plate's middle, its rim, and its corner are as smooth; a step and a low place are less."""
+    run = RunConfig()
+    x, y = np.meshgrid(np.linspace(-0.06, 0.06, 241), np.linspace(-0.06, 0.06, 241))
+    height = np.where(x > 0.04, 0.05, 0.10)
+    points = np.column_stack([x.ravel(), y.ravel(), height.ravel()])
+    seen = picture_of(points, np.array([0.0, 0.0, 0.6]), np.zeros(3))
+    places = np.array([[0, 0, 0.10], [-0.058, 0, 0.1], [0.038, 0, 0.1], [-0.058, 0.058, 0.1]])
+    places = np.concatenate([places, [[0.06, 0.0, 0.05]]])
+    poses = contact_frames(places, np.tile([0, 0, 1.0], (5, 1)), np.zeros(5))
+    ranking = GeometricRanking(CONFIG.policy.picker, run.sensing, run.gripper.pad)
+    value = ranking([seen], Candidates(poses, np.zeros(5)))
+    assert np.argmax(value) == 0
+    assert value[0] > 0.9 > value[1] > value[3]  # half of the pad is over nothing, three quarters
+    assert value[0] > value[2]  # half of it is over the step
+    assert np.argmin(value) == 4
 
 
 def test_smoothing_prefers_a_region_to_a_lucky_point() -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from pipeline.control.success import Outcome, advantage, success_rate
+from pipeline.control.success import Outcome, advantage, bootstrap_interval, success_rate
 
 
 def test_wilson_interval_of_eight_in_ten() -> None:
@@ -12,6 +12,23 @@ def test_wilson_interval_of_eight_in_ten() -> None:
 
 def test_no_attempt_says_nothing() -> None:
     assert success_rate(0, 0) == (0.0, 0.0, 1.0)
+
+
+def test_attempts_at_one_clutter_and_object_are_not_independent() -> None:
+    """Ten attempts that are alike within a clutter say as much as the clutters do."""
+    lifted = [True] * 30 + [False] * 10
+    each = [str(number) for number in range(40)]
+    apart = bootstrap_interval(lifted, each, [""] * 40)
+    wilson = success_rate(30, 40)[1:]
+    assert apart == pytest.approx(wilson, abs=0.03)
+    four = [str(number // 10) for number in range(40)]
+    by_clutter = bootstrap_interval(lifted, four, [""] * 40)
+    by_object = bootstrap_interval(lifted, each, four)
+    for low, high in (by_clutter, by_object):
+        assert high - low > 2 * (apart[1] - apart[0])
+    assert bootstrap_interval(lifted, four, four) == bootstrap_interval(lifted, four, four)
+    assert bootstrap_interval([], [], []) == (0.0, 1.0)
+    assert bootstrap_interval([True], ["a"], ["b"]) == (1.0, 1.0)
 
 
 def test_a_policy_that_is_always_better_is_significantly_so() -> None:

@@ -134,7 +134,7 @@ def unused(_: Sequence[DepthPicture], candidates: Candidates) -> np.ndarray:
 def test_it_feels_its_way_down_to_what_it_cannot_measure(several_views: bool) -> None:
     robot = FakeRobot(TOP_M)
     eyes = GlassEyes(np.empty((0, 3)), robot)
-    strategy = Strategy("closed-loop", unused, several_views, corrects=True, feels=True)
+    strategy = Strategy("closed-loop", unused, several_views, True, True, True)
     config = EvaluateConfig()
     decision = Attempt(eyes, robot, strategy, config, 0.01, np.random.default_rng(0)).run()
     assert decision.cause is Cause.LIFTED
@@ -146,7 +146,7 @@ def test_it_feels_its_way_down_to_what_it_cannot_measure(several_views: bool) ->
 def test_a_place_that_failed_is_felt_for_last() -> None:
     robot = FakeRobot(TOP_M)
     eyes = TwoGlasses(np.empty((0, 3)), robot)
-    strategy = Strategy("open-loop", unused, several_views=False, corrects=False, feels=False)
+    strategy = Strategy("open-loop", unused, False, False, False, False)
     aims: list[np.ndarray] = []
     for avoid_m in ([], aims):
         attempt = Attempt(

@@ -110,6 +110,14 @@ def curved_hold() -> Hold:
     )
 
 
+@settings(max_examples=10, deadline=None)
+@given(arrays.arrays(np.float64, (4, 6), elements=st.floats(-1, 1)))
+def test_several_loads_are_borne_up_to_the_least_of_their_scales(loads: np.ndarray) -> None:
+    hold = flat_hold()
+    each = min(hold.largest_scale(load) for load in loads)
+    assert hold.largest_common_scale(loads) == pytest.approx(each, rel=1e-4)
+
+
 @pytest.mark.parametrize("hold", [flat_hold(), curved_hold()])
 def test_where_the_linear_program_gives_up_halving_finds_the_same(hold: Hold) -> None:
     for load in (np.array([0.3, 0, -1, 0.01, 0, 0.002]), np.array([0, 0, -1.0, 0, 0.02, 0])):

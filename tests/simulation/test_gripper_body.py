@@ -18,7 +18,7 @@ from pipeline.control.robot import Reading
 from pipeline.control.wrench_monitor import hanging_n
 from pipeline.gripper.pad import build_pad
 from pipeline.physics.engine import add_body, new_world
-from pipeline.simulation.gripper_body import SuctionGripper
+from pipeline.simulation.gripper_body import SuctionGripper, there_and_back
 from pipeline.simulation.iiwa14 import flange_from_gripper
 from pipeline.simulation.picking import build_mover
 from tests.bodies import catalogue_object, pose_at
@@ -146,6 +146,34 @@ def test_acceleration_breaks_what_stillness_holds(cache: Path) -> None:
     went(gripper, pose_at(0, 0, -0.02), 0.2)
     gripper.vacuum(on=True)
     assert not lifted(gripper)
+
+
+@pytest.mark.parametrize(("acceleration_m_s2", "holds"), [(3.0, True), (9.0, False)])
+def test_transport_pulls_sideways_with_mass_times_acceleration(
+    cache: Path, acceleration_m_s2: float, holds: bool
+) -> None:
+    """Eq. (8): at 0.4 of F_v in weight the side force passes √3/3 μ F_v from 7.1 m/s² on."""
+    dense = 0.4 * PULL_N / 9.81 / float(np.prod(BLOCK))
+    gripper = gripper_over(block(), cache, density_kg_m3=dense)
+    assert sealed(gripper)
+    assert lifted(gripper)
+    before, from_s = gripper.pose(), gripper.time_s
+    assert (hanging_n(gripper.carry(acceleration_m_s2)) > 0.02) is holds
+    np.testing.assert_allclose(gripper.pose(), before, atol=1e-6)
+    way = [
+        s.world_from_gripper[:3, 3] - before[:3, 3] for s in gripper.samples if s.time_s > from_s
+    ]
+    assert np.abs(way)[:, 2].max() < 1e-6
+    assert np.linalg.norm(way, axis=1).max() == pytest.approx(8.0 * 0.025, rel=0.05)
+
+
+def test_a_leg_is_full_acceleration_and_full_braking() -> None:
+    times = np.linspace(0, 2.5, 2501)
+    share = np.array([there_and_back(t) for t in times])
+    assert share[[0, 1000, 2000, 2500]].tolist() == [0.0, 1.0, 0.0, 0.0]
+    curvature = np.diff(share, 2) / 1e-6
+    assert np.abs(curvature).max() == pytest.approx(4.0, rel=1e-3)
+    assert (np.abs(np.abs(curvature[:1990]) - 4.0) < 0.01).mean() > 0.99
 
 
 def test_off_centre_the_same_weight_peels(cache: Path) -> None:

@@ -36,6 +36,7 @@ epochs = 2
 batch_size = 32
 [evaluate]
 attempts_per_clutter = 2
+policies = ["closed-loop", "open-loop", "geometric"]
 [evaluate.policy]
 candidates = 24
 """

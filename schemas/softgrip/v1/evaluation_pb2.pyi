@@ -8,7 +8,7 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class Attempt(_message.Message):
-    __slots__ = ("scene_id", "level", "attempt", "outcome", "cause", "target", "candidates", "predicted_quality", "reached_quality", "seal_pressure", "lifted_height_m", "duration_s", "world_from_gripper", "reached_pose", "time_s", "gripper_path", "object_paths", "base_wrench", "states", "policy", "candidate_poses", "candidate_quality", "corrections", "pictures", "regrasps", "joint_path")
+    __slots__ = ("scene_id", "level", "attempt", "outcome", "cause", "target", "candidates", "predicted_quality", "reached_quality", "seal_pressure", "lifted_height_m", "duration_s", "world_from_gripper", "reached_pose", "time_s", "gripper_path", "object_paths", "base_wrench", "states", "policy", "candidate_poses", "candidate_quality", "corrections", "pictures", "regrasps", "joint_path", "seals", "carried_m_s2")
     SCENE_ID_FIELD_NUMBER: _ClassVar[int]
     LEVEL_FIELD_NUMBER: _ClassVar[int]
     ATTEMPT_FIELD_NUMBER: _ClassVar[int]
@@ -35,6 +35,8 @@ class Attempt(_message.Message):
     PICTURES_FIELD_NUMBER: _ClassVar[int]
     REGRASPS_FIELD_NUMBER: _ClassVar[int]
     JOINT_PATH_FIELD_NUMBER: _ClassVar[int]
+    SEALS_FIELD_NUMBER: _ClassVar[int]
+    CARRIED_M_S2_FIELD_NUMBER: _ClassVar[int]
     scene_id: str
     level: int
     attempt: int
@@ -61,7 +63,9 @@ class Attempt(_message.Message):
     pictures: _containers.RepeatedCompositeFieldContainer[DepthPicture]
     regrasps: int
     joint_path: _tensor_pb2.Tensor
-    def __init__(self, scene_id: _Optional[str] = ..., level: _Optional[int] = ..., attempt: _Optional[int] = ..., outcome: _Optional[str] = ..., cause: _Optional[str] = ..., target: _Optional[str] = ..., candidates: _Optional[int] = ..., predicted_quality: _Optional[float] = ..., reached_quality: _Optional[float] = ..., seal_pressure: _Optional[float] = ..., lifted_height_m: _Optional[float] = ..., duration_s: _Optional[float] = ..., world_from_gripper: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., reached_pose: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., time_s: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., gripper_path: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., object_paths: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., base_wrench: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., states: _Optional[_Iterable[str]] = ..., policy: _Optional[str] = ..., candidate_poses: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., candidate_quality: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., corrections: _Optional[int] = ..., pictures: _Optional[_Iterable[_Union[DepthPicture, _Mapping]]] = ..., regrasps: _Optional[int] = ..., joint_path: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ...) -> None: ...
+    seals: int
+    carried_m_s2: float
+    def __init__(self, scene_id: _Optional[str] = ..., level: _Optional[int] = ..., attempt: _Optional[int] = ..., outcome: _Optional[str] = ..., cause: _Optional[str] = ..., target: _Optional[str] = ..., candidates: _Optional[int] = ..., predicted_quality: _Optional[float] = ..., reached_quality: _Optional[float] = ..., seal_pressure: _Optional[float] = ..., lifted_height_m: _Optional[float] = ..., duration_s: _Optional[float] = ..., world_from_gripper: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., reached_pose: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., time_s: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., gripper_path: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., object_paths: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., base_wrench: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., states: _Optional[_Iterable[str]] = ..., policy: _Optional[str] = ..., candidate_poses: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., candidate_quality: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., corrections: _Optional[int] = ..., pictures: _Optional[_Iterable[_Union[DepthPicture, _Mapping]]] = ..., regrasps: _Optional[int] = ..., joint_path: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., seals: _Optional[int] = ..., carried_m_s2: _Optional[float] = ...) -> None: ...
 
 class DepthPicture(_message.Message):
     __slots__ = ("camera", "depth_mm", "intrinsics", "world_from_camera")
@@ -76,8 +80,15 @@ class DepthPicture(_message.Message):
     def __init__(self, camera: _Optional[str] = ..., depth_mm: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., intrinsics: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., world_from_camera: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ...) -> None: ...
 
 class LevelResult(_message.Message):
-    __slots__ = ("level", "attempts", "lifted", "objects", "clutters", "cleared", "success_rate", "interval_low", "interval_high", "failures", "policy", "seconds_a_pick", "picks_an_hour")
+    __slots__ = ("level", "attempts", "lifted", "objects", "clutters", "cleared", "success_rate", "interval_low", "interval_high", "failures", "policy", "seconds_a_pick", "picks_an_hour", "seals", "lifted_at_first_seal", "carried")
     class FailuresEntry(_message.Message):
+        __slots__ = ("key", "value")
+        KEY_FIELD_NUMBER: _ClassVar[int]
+        VALUE_FIELD_NUMBER: _ClassVar[int]
+        key: str
+        value: int
+        def __init__(self, key: _Optional[str] = ..., value: _Optional[int] = ...) -> None: ...
+    class CarriedEntry(_message.Message):
         __slots__ = ("key", "value")
         KEY_FIELD_NUMBER: _ClassVar[int]
         VALUE_FIELD_NUMBER: _ClassVar[int]
@@ -97,6 +108,9 @@ class LevelResult(_message.Message):
     POLICY_FIELD_NUMBER: _ClassVar[int]
     SECONDS_A_PICK_FIELD_NUMBER: _ClassVar[int]
     PICKS_AN_HOUR_FIELD_NUMBER: _ClassVar[int]
+    SEALS_FIELD_NUMBER: _ClassVar[int]
+    LIFTED_AT_FIRST_SEAL_FIELD_NUMBER: _ClassVar[int]
+    CARRIED_FIELD_NUMBER: _ClassVar[int]
     level: int
     attempts: int
     lifted: int
@@ -110,7 +124,10 @@ class LevelResult(_message.Message):
     policy: str
     seconds_a_pick: float
     picks_an_hour: float
-    def __init__(self, level: _Optional[int] = ..., attempts: _Optional[int] = ..., lifted: _Optional[int] = ..., objects: _Optional[int] = ..., clutters: _Optional[int] = ..., cleared: _Optional[int] = ..., success_rate: _Optional[float] = ..., interval_low: _Optional[float] = ..., interval_high: _Optional[float] = ..., failures: _Optional[_Mapping[str, int]] = ..., policy: _Optional[str] = ..., seconds_a_pick: _Optional[float] = ..., picks_an_hour: _Optional[float] = ...) -> None: ...
+    seals: int
+    lifted_at_first_seal: int
+    carried: _containers.ScalarMap[str, int]
+    def __init__(self, level: _Optional[int] = ..., attempts: _Optional[int] = ..., lifted: _Optional[int] = ..., objects: _Optional[int] = ..., clutters: _Optional[int] = ..., cleared: _Optional[int] = ..., success_rate: _Optional[float] = ..., interval_low: _Optional[float] = ..., interval_high: _Optional[float] = ..., failures: _Optional[_Mapping[str, int]] = ..., policy: _Optional[str] = ..., seconds_a_pick: _Optional[float] = ..., picks_an_hour: _Optional[float] = ..., seals: _Optional[int] = ..., lifted_at_first_seal: _Optional[int] = ..., carried: _Optional[_Mapping[str, int]] = ...) -> None: ...
 
 class Comparison(_message.Message):
     __slots__ = ("policy", "baseline", "clutters", "success_rate", "baseline_success_rate", "p_paired", "p_fisher")
