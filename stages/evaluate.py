@@ -58,7 +58,8 @@ def build(stage: StageContext) -> Summary:
     done = run_in_order(pick_clutter, jobs, stage.workers, stage.executor)
     parts = list(progress(done, len(jobs), "evaluate: clutters", "clutter"))
     attempts = [message for part in parts for message in read_attempts(part)]
-    results = results_of(scenes, stage.config.evaluate.policies, attempts)
+    wanted = stage.config.evaluate
+    results = results_of(scenes, wanted.policies, attempts, wanted.transport.accelerations_m_s2)
     publish(stage, attempts, results)
     shutil.rmtree(stage.folder.state("evaluate"))
     return results.summary()

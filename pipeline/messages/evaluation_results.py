@@ -61,23 +61,50 @@ class Results:
 
 
 def results_of(
-    scenes: list[ClutterScene], policies: Sequence[PolicyName], attempts: list[Attempt]
+    scenes: list[ClutterScene],
+    policies: Sequence[PolicyName],
+    attempts: list[Attempt],
+    accelerations_m_s2: Sequence[float],
 ) -> Results:
-    """Count them."""
+    """Count what came of all attempts.
+
+    Parameters
+    ----------
+    scenes
+        The clutters.
+    policies
+        Those that tried them, the judged one first.
+    attempts
+        All of them.
+    accelerations_m_s2
+        Of the transport [m/s2].
+
+    Returns
+    -------
+    Figures by level, over all levels, and of the first policy against each other.
+    """
     levels = sorted({scene.level for scene in scenes})
     by_level = [
-        _result(policy, level, [s for s in scenes if s.level == level], attempts)
+        _result(
+            policy, level, [s for s in scenes if s.level == level], attempts, accelerations_m_s2
+        )
         for policy in policies
         for level in levels
     ]
-    overall = [_result(policy, ALL_LEVELS, scenes, attempts) for policy in policies]
+    overall = [
+        _result(policy, ALL_LEVELS, scenes, attempts, accelerations_m_s2) for policy in policies
+    ]
     first, *others = policies
     comparisons = [_comparison(first, other, scenes, attempts) for other in others]
     return Results(by_level, overall, comparisons)
 
 
 def _result(
-    policy: PolicyName, level: int, scenes: list[ClutterScene], attempts: list[Attempt]
+    policy: PolicyName,
+    level: int,
+    scenes: list[ClutterScene],
+    attempts: list[Attempt],
+    accelerations_m_s2: Sequence[float],
 ) -> LevelResult:
     """One policy on some clutters, with its 95 % interval and the causes of its failures."""
     ids = {scene.scene_id for scene in scenes}
@@ -90,12 +117,10 @@ def _result(
         [made.scene_id for made in mine],
         [made.target for made in mine],
     )
-    carried = Counter(
-        f"{level:g}"
-        for level in sorted({made.carried_m_s2 for made in mine if made.carried_m_s2 > 0})
-        for made in mine
-        if made.carried_m_s2 >= level
-    )
+    carried = {
+        f"{acceleration:g}": sum(made.carried_m_s2 >= acceleration for made in mine)
+        for acceleration in accelerations_m_s2
+    }
     time_s = sum(made.duration_s for made in mine)
     return LevelResult(
         policy=policy,

@@ -107,6 +107,7 @@ def test_training_and_evaluation_report_what_they_did(run: RunFolder) -> None:
         assert level.lifted + sum(level.failures.values()) == level.attempts
         assert whole.seals == sum(made.seals for made in mine)
         assert whole.lifted_at_first_seal <= level.lifted == whole.carried["5"]
+        assert sorted(whole.carried) == ["1", "3", "5"]
         assert all(len(made.states) == made.time_s.shape[0] for made in mine)
     text = (run.path / "evaluate.md").read_text()
     assert all(level.policy in text for level in levels)
