@@ -41,8 +41,9 @@ def test_pictures_that_come_too_soon_are_skipped_and_counted() -> None:
     assert all(one.seconds == pytest.approx(0.05) for one in found)
 
 
-def proposer() -> LiveGrasps:
-    return LiveGrasps(GeometricRanking(CONFIG.evaluate.policy.picker), CONFIG)
+def proposer(config: RunConfig = CONFIG) -> LiveGrasps:
+    picker = config.evaluate.policy.picker
+    return LiveGrasps(GeometricRanking(picker, config.sensing, config.gripper.pad), config)
 
 
 def test_the_best_grasp_of_a_picture_lies_on_the_boxs_top(frame: Frame) -> None:
@@ -71,8 +72,7 @@ def test_a_support_that_moved_is_found_anew(frame: Frame) -> None:
 
 def test_thinned_pictures_give_the_same_place(frame: Frame) -> None:
     thin = RunConfig.model_validate({"predict": {"live": {"every_px": 2}}})
-    live = LiveGrasps(GeometricRanking(thin.evaluate.policy.picker), thin)
-    best = live.propose(frame, np.random.default_rng(0), Parts()).world_from_contact[0]
+    best = proposer(thin).propose(frame, np.random.default_rng(0), Parts()).world_from_contact[0]
     assert best[2, 3] == pytest.approx(0.08, abs=0.005)
 
 
