@@ -2,7 +2,9 @@
 
 The object is at rest where the vacuum's wrench, contact and load sum to zero. Contact pushes along
 the surface, never pulls, and rubs within Coulomb's cone; how it spreads over the patches that touch
-is free: the load is borne if any spread balances it (the static theorem of limit analysis). Cones
+is free: the load is borne if any spread balances it (the static theorem of limit analysis). All
+pushes together are no more than the vacuum's pull along the normals, for nothing else presses the
+pad on; without that bound a pad between steep walls would jam there and bear any weight. Cones
 are replaced by pyramids inside them, so this is a linear program in the multipliers of a few
 hundred wrenches, by SciPy's HiGHS, and one load is checked by non-negative least squares.
 """
@@ -33,11 +35,14 @@ class Hold:
         Wrenches of contact, a column each of a unit push with its friction, shape (6, m).
     radius_m
         r_G, by which moments are made comparable with forces [m].
+    most_n
+        Contact pushes with no more than this in all, beside what the load itself presses on [N].
     """
 
     suction: Float[np.ndarray, " 6"]
     contact: Float[np.ndarray, "6 m"]
     radius_m: float
+    most_n: float = np.inf
 
     def bears(self, load: Float[np.ndarray, " 6"]) -> bool:
         """Whether a load is balanced.
@@ -53,12 +58,13 @@ class Hold:
         True where contact and friction can balance it.
         """
         wanted = self._scaled(-(load + self.suction))
+        columns = self._scaled(self.contact)
+        if np.isfinite(self.most_n):  # pushes and what is left of them make up the most
+            left = np.append(np.ones(columns.shape[1]), 1.0)
+            columns = np.vstack([np.column_stack([columns, np.zeros(6)]), left])
+            wanted = np.append(wanted, self.most_n + max(float(load[2]), 0.0))
         # SciPy's nnls ends the process on a matrix without columns.
-        residual = (
-            nnls(self._scaled(self.contact), wanted)[1]
-            if self.contact.shape[1]
-            else np.linalg.norm(wanted)
-        )
+        residual = nnls(columns, wanted)[1] if columns.shape[1] else np.linalg.norm(wanted)
         largest = max(float(np.abs(self._scaled(self.suction)).max()), float(np.abs(wanted).max()))
         return bool(residual <= BALANCED * largest)
 
@@ -77,7 +83,11 @@ class Hold:
         columns = np.column_stack([self._scaled(self.contact), self._scaled(load)])
         cost = np.zeros(columns.shape[1])
         cost[-1] = -1.0
-        found = linprog(cost, A_eq=columns, b_eq=self._scaled(-self.suction), method="highs")
+        pushes, most = None, None
+        if np.isfinite(self.most_n):
+            pushes = np.append(np.ones(self.contact.shape[1]), -max(float(load[2]), 0.0))[None]
+            most = np.array([self.most_n])
+        found = linprog(cost, pushes, most, columns, self._scaled(-self.suction), method="highs")
         if found.status == INFEASIBLE:
             return 0.0
         if found.status == UNBOUNDED:
@@ -152,24 +162,63 @@ def suction_wrench(
     x, y = disc.vertices_xy_m.T
     pulls = np.where(on_target, vacuum_pa * disc.areas_m2, 0.0)
     wrench = np.array([0.0, 0.0, pulls.sum(), y @ pulls, -(x @ pulls), 0.0])
-    inside = on_target[disc.triangles].all(axis=1)
+    inside, slope_x, slope_y = _slopes(disc, surface_m, on_target)
     corners = disc.triangles[inside]
-    area = disc.triangle_areas_m2[inside]
-    height = surface_m[corners]
     cx, cy = x[corners], y[corners]
-    slope_x, slope_y = (
-        sum(height[:, k] * (c[:, (k + 1) % 3] - c[:, (k + 2) % 3]) for k in range(3)) / (2 * area)
-        for c in (cy, -cx)
-    )
-    push = vacuum_pa[corners].mean(axis=1) * area
+    push = vacuum_pa[corners].mean(axis=1) * disc.triangle_areas_m2[inside]
     fx, fy = -push * slope_x, -push * slope_y
-    z = height.mean(axis=1)
+    z = surface_m[corners].mean(axis=1)
     wrench[0] += fx.sum()
     wrench[1] += fy.sum()
     wrench[3] -= z @ fy
     wrench[4] += z @ fx
     wrench[5] += cx.mean(axis=1) @ fy - cy.mean(axis=1) @ fx
     return wrench
+
+
+def suction_along_normals_n(
+    disc: Disc,
+    vacuum_pa: Float[np.ndarray, " n"],
+    surface_m: Float[np.ndarray, " n"],
+    on_target: Bool[np.ndarray, " n"],
+) -> float:
+    """The vacuum's pull on the object with all directions counted alike [N].
+
+    Parameters
+    ----------
+    disc
+        The pad's elements.
+    vacuum_pa
+        p under the face, shape (n,) [Pa].
+    surface_m
+        Height of the surface, shape (n,), GCS [m].
+    on_target
+        Whether it is the object's, shape (n,).
+
+    Returns
+    -------
+    ∫ p √(1 + |∇s|²) dA, gradients those of the elements.
+    """
+    corners, slope_x, slope_y = _slopes(disc, surface_m, on_target)
+    push = vacuum_pa[disc.triangles[corners]].mean(axis=1) * disc.triangle_areas_m2[corners]
+    level = float(np.where(on_target, vacuum_pa * disc.areas_m2, 0.0).sum())
+    return level + float(push @ (np.sqrt(1.0 + slope_x**2 + slope_y**2) - 1.0))
+
+
+def _slopes(
+    disc: Disc, surface_m: Float[np.ndarray, " n"], on_target: Bool[np.ndarray, " n"]
+) -> tuple[Bool[np.ndarray, " m"], Float[np.ndarray, " k"], Float[np.ndarray, " k"]]:
+    """Elements that lie on the object whole, and ∂s/∂x and ∂s/∂y of these."""
+    x, y = disc.vertices_xy_m.T
+    inside = on_target[disc.triangles].all(axis=1)
+    corners = disc.triangles[inside]
+    twice = 2 * disc.triangle_areas_m2[inside]
+    height = surface_m[corners]
+    slope_x, slope_y = (
+        sum(height[:, k] * (c[:, (k + 1) % 3] - c[:, (k + 2) % 3]) for k in range(3)) / twice
+        for c in (y[corners], -x[corners])
+    )
+    return inside, np.asarray(slope_x), np.asarray(slope_y)
 
 
 def contact_wrenches(

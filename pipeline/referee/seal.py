@@ -13,7 +13,13 @@ from pipeline.referee import leak as film
 from pipeline.referee.disc import Disc, build_disc
 from pipeline.referee.foundation import Cushion, Pressed
 from pipeline.referee.leak import Face, Vacuum
-from pipeline.referee.load import Hold, contact_wrenches, suction_wrench, weight_loads
+from pipeline.referee.load import (
+    Hold,
+    contact_wrenches,
+    suction_along_normals_n,
+    suction_wrench,
+    weight_loads,
+)
 from pipeline.referee.pump import Fan
 from pipeline.referee.surface import Surface
 
@@ -120,7 +126,10 @@ def seal(referee: Referee, surface: Surface, way: Way = "compiled") -> Seal:
     contact = contact_wrenches(
         disc, touches, surface.height_m, surface.normals, referee.config.friction
     )
-    hold = Hold(wrench, contact, disc.radius_m)
+    most_n = suction_along_normals_n(
+        disc, vacuum.under_face_pa, surface.height_m, surface.on_target
+    )
+    hold = Hold(wrench, contact, disc.radius_m, most_n)
     return Seal(surface, pressed, vacuum, film_m, touches, float(wrench[2]), hold)
 
 

@@ -13,6 +13,7 @@ from pipeline.referee.load import (
     FRICTION_SIDES,
     Hold,
     contact_wrenches,
+    suction_along_normals_n,
     suction_wrench,
     weight_loads,
 )
@@ -76,6 +77,39 @@ def test_pressing_on_is_borne_without_end() -> None:
     hold = flat_hold()
     assert hold.largest_scale(np.array([0, 0, 1.0, 0, 0, 0])) == np.inf
     assert hold.bears(np.array([0, 0, 500.0, 0, 0, 0]))
+
+
+def test_a_pad_jammed_between_walls_bears_no_more_than_pull_and_friction() -> None:
+    """Pushes N on two facing walls rub with μ N: F + μ N, and N is at most what is said."""
+    walls = np.array([[1.0, 0, 0, 0, 0, 0], [-1.0, 0, 0, 0, 0, 0]]).T
+    rubbing = walls + FRICTION * np.eye(6)[2][:, None]
+    pull = np.array([0.0, 0.0, FORCE_N, 0.0, 0.0, 0.0])
+    push = np.column_stack([walls, rubbing, -np.eye(6)[2]])
+    down = -np.eye(6)[2]
+    assert Hold(pull, push, 0.025).largest_scale(down) == np.inf
+    bounded = Hold(pull, push, 0.025, 2 * FORCE_N)
+    expected = (1 + 2 * FRICTION) * FORCE_N
+    assert bounded.largest_scale(down) == pytest.approx(expected)
+    assert bounded.bears(0.999 * expected * down)
+    assert not bounded.bears(1.001 * expected * down)
+    assert bounded.largest_scale(-down) == np.inf
+
+
+def test_the_bound_does_not_bind_where_the_surface_is_level() -> None:
+    free = flat_hold()
+    level = np.zeros(COUNT)
+    most_n = suction_along_normals_n(DISC, np.full(COUNT, VACUUM_PA), level, ALL)
+    assert most_n == pytest.approx(FORCE_N)
+    bounded = Hold(free.suction, free.contact, free.radius_m, most_n)
+    for load in np.random.default_rng(0).normal(size=(6, 6)):
+        load[2] = -abs(load[2])
+        assert bounded.largest_scale(load) == pytest.approx(free.largest_scale(load), rel=1e-5)
+
+
+def test_on_a_slope_the_pull_along_the_normal_is_pressure_times_true_area() -> None:
+    slope = 0.4 * DISC.vertices_xy_m[:, 0] - 0.3 * DISC.vertices_xy_m[:, 1]
+    found = suction_along_normals_n(DISC, np.full(COUNT, VACUUM_PA), slope, ALL)
+    assert found == pytest.approx(FORCE_N * np.sqrt(1.25))
 
 
 def test_nothing_holds_nothing() -> None:
