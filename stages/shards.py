@@ -16,7 +16,7 @@ from pipeline.artifacts.sharding import (
 from pipeline.clutter.levels import level_of
 from pipeline.errors import ArtifactError
 from pipeline.execution import StageContext, Summary, generator, progress, stage_command
-from pipeline.labelling.balancing import first_proposals, quality_histogram
+from pipeline.labelling.balancing import proposal_weights, quality_histogram
 from pipeline.messages.grasps import grasps_of
 from pipeline.messages.samples import sample_batch
 from pipeline.network.samples import SPLITS, Samples, join_samples
@@ -73,7 +73,7 @@ def as_samples(message: GraspBatch, names: dict[str, int]) -> tuple[str, Samples
         shape_class=np.full(count, shape_class),
         level=np.full(count, origin.level),
         pressure=grasps.pressure.astype(np.float32),
-        proposal_weight=first_proposals(grasps.proposal, grasps.keep_probability),
+        proposal_weight=proposal_weights(grasps.proposal, grasps.keep_probability),
         pictures=grasps.pictures,
     )
 

@@ -1,4 +1,4 @@
-"""[agreement]: on what grasps the label is held against the referee."""
+"""[agreement]: the grasps on which the label is compared with the referee."""
 
 from typing import Self
 
@@ -8,7 +8,7 @@ from pipeline.config.section import Section
 
 
 class AgreementConfig(Section):
-    """Grasps of `make referee`: scenes of the mesh folder, and of them an even choice."""
+    """The scenes that `make referee` builds, and the grasps that it chooses from them."""
 
     clutters_per_level: int = Field(
         2, ge=1, description="clutters of test and training objects a level; half of val objects"

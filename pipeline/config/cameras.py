@@ -1,4 +1,4 @@
-"""[cameras]: what looks at the scenes, from where, and which renderer draws what it sees."""
+"""[cameras]: the cameras, their viewpoints, and the renderer of their pictures."""
 
 import math
 from typing import ClassVar, Literal, Self
@@ -12,7 +12,7 @@ RendererName = Literal["auto", "sapien", "embree"]
 
 
 class DepthCameraConfig(ScaledSection):
-    """A pinhole depth camera; what it measures wrongly is its sensor's."""
+    """A pinhole depth camera; its sensor decides the noise."""
 
     width_px: int = Field(ge=16, le=4096, description="width of the depth image")
     height_px: int = Field(ge=16, le=4096, description="height of the depth image")

@@ -1,4 +1,4 @@
-"""[dataset]: what a run's report says of it in words; no result depends on it."""
+"""[dataset]: texts for a run's report and dataset card; no result depends on them."""
 
 from pydantic import Field
 
@@ -6,7 +6,7 @@ from pipeline.config.section import Section
 
 
 class DatasetConfig(Section):
-    """The words of the dataset card."""
+    """Texts of the dataset card."""
 
     title: str = Field("", description="name of the dataset; without it the run's")
     meshes: str = Field("", description="where the meshes are from and whom to cite for them")

@@ -26,7 +26,7 @@ class SuctionConfig(Section):
 
 
 class LiftConfig(ScaledSection):
-    """When a grasp counts."""
+    """The lift and the shake that an object must survive for a grasp to count as a success."""
 
     height_m: ClassVar[LengthInMetres] = LengthInMetres()
 
@@ -164,9 +164,9 @@ class EvaluateConfig(Section):
 
 
 class RecordingConfig(Section):
-    """How much of a stage is shown; recordings are samples, artifacts are whole.
+    """How many items of a stage its recording shows; the artifact always holds all.
 
-    The bounds keep a recording under 200 MB, by what one item of each kind takes at most.
+    The bounds keep a recording under 200 MB; they follow from the largest size of an item.
     """
 
     objects: int = Field(60, ge=1, le=400, description="objects shown; up to 0.4 MB each")

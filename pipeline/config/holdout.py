@@ -1,4 +1,4 @@
-"""[holdout]: on what clutters and grasps of untrained meshes a given network is held to."""
+"""[holdout]: the clutters and grasps of unseen meshes on which a given network is tested."""
 
 from pydantic import Field
 

@@ -1,14 +1,14 @@
-"""The configuration of a run within a run: of the referee, of a holdout, of folds."""
+"""Configuration of a run within a run: of the referee, of a holdout, of folds."""
 
 from pipeline.config.scenes import ClutterCounts, ScenesConfig
 from pipeline.config.tree import RunConfig
 
 
 def judged_config(config: RunConfig) -> RunConfig:
-    """A run's configuration for a run within it: all meshes, as far as levels have objects.
+    """Configuration of the run that `make referee` makes within a run.
 
-    As many clutters and labels as [agreement] wants; all levels, without the clutters that cannot
-    be built; no objects but those of the mesh folder, and each of them.
+    It has the numbers of clutters and labels of [agreement], and all levels; clutters that cannot
+    be built are left out. It uses every object of the mesh folder and no others.
     """
     some = config.agreement.clutters_per_level
     counts = ClutterCounts(train=some, val=(some + 1) // 2, test=some)
@@ -39,7 +39,7 @@ def judged_config(config: RunConfig) -> RunConfig:
 def holdout_config(config: RunConfig) -> RunConfig:
     """A run's configuration with every object in the test split, as [holdout] wants it.
 
-    What speaks of the run's own meshes is left out: families, copies, a limit, transparent names.
+    Settings for the run's own meshes are left out: families, copies, a limit, transparent names.
     """
     wanted = config.holdout
     return config.model_copy(

@@ -51,7 +51,7 @@ class TrainConfig(Section):
 
 
 class SweepConfig(Section):
-    """The family compared, Fig. 1, and what attention and symmetry buy: one budget for all."""
+    """Comparison of the network family (Fig. 1), and of networks without attention or symmetry."""
 
     depths: tuple[Layers, ...] = Field(
         (18, 24, 30, 38, 44, 52, 58, 66, 72, 80, 86, 94, 102),

@@ -9,7 +9,7 @@ from pipeline.config.section import LengthInMetres, ScaledSection
 
 
 class MotionConfig(ScaledSection):
-    """How the velocity of what passes by is told from two pictures."""
+    """How the velocity of a moving object is measured from two pictures."""
 
     cell_m: ClassVar[LengthInMetres] = LengthInMetres()
     still_m: ClassVar[LengthInMetres] = LengthInMetres()
@@ -44,7 +44,7 @@ class MotionConfig(ScaledSection):
 
 
 class UnseenConfig(ScaledSection):
-    """What colour shows and depth does not: its visual hull."""
+    """Visual hull of an object that colour pictures show and depth images do not."""
 
     cell_m: ClassVar[LengthInMetres] = LengthInMetres()
     height_max_m: ClassVar[LengthInMetres] = LengthInMetres()

@@ -66,7 +66,7 @@ class SupportConfig(Section):
 
 
 class TrialConfig(Section):
-    """How `make real` looks at first choices on real frames."""
+    """How `make real` checks the best grasp of real frames."""
 
     tilt_max_rad: float = Field(
         math.radians(100),

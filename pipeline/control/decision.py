@@ -1,4 +1,4 @@
-"""What an attempt is given (its strategy) and what it reports: its decisions and its end."""
+"""The strategy of an attempt, and the record of its decisions and of how it ended."""
 
 from dataclasses import dataclass, field
 from enum import StrEnum

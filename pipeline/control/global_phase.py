@@ -1,7 +1,7 @@
 """The global phase: take pictures, sample contacts, rank them, choose the best that can be reached.
 
 Objects that only the colour pictures show, such as transparent ones, rank below all measured
-contacts: the gripper has to go down on them until it touches.
+contacts, because the gripper has to go down on them until it touches.
 """
 
 from collections.abc import Callable, Sequence
@@ -40,13 +40,13 @@ class Choice:
         Its frame, shape (4, 4).
     quality
         Its q-hat; 0 where it was not measured.
-    felt_for
+    unmeasured
         Whether its height is not measured, so that the pad goes down until it touches.
     """
 
     world_from_contact: Pose
     quality: float
-    felt_for: bool = False
+    unmeasured: bool = False
 
 
 class GlobalPhase:
@@ -62,14 +62,14 @@ class GlobalPhase:
         rng: np.random.Generator,
         avoid_m: Sequence[Float[np.ndarray, " 3"]],
     ) -> None:
-        """Store what the phase works with; nothing is looked at yet.
+        """Store the arguments; no picture is taken yet.
 
         Parameters
         ----------
         eyes
             The cameras.
         robot
-            Tells its pose and which poses it can reach.
+            Reports its pose and which poses it can reach.
         strategy
             Gives the ranking.
         config
@@ -159,7 +159,7 @@ class GlobalPhase:
         Parameters
         ----------
         place_m
-            Where the load hangs, horizontally in WCS [m], shape (2,).
+            Horizontal place of the load's centre of mass in WCS [m], shape (2,).
         lever_m
             Horizontal lever of the contact that did not hold [m].
         pictures
@@ -187,10 +187,11 @@ class GlobalPhase:
     def _look_closer(
         self, pictures: Sequence[DepthPicture], travel: Travel
     ) -> list[DepthPicture] | Cause:
-        """Pictures of the wrist's camera above the most promising places.
+        """Take pictures with the wrist's camera above the places of highest q-hat.
 
-        For what depth does not show a look that is left becomes two, from opposite sides: the
-        outlines lean over it alike, and its middle is between.
+        Pictures that are left over are taken of objects that depth does not show, two of each from
+        opposite sides: the errors of the two outlines are then opposite, and their mean is the
+        object's middle.
         """
         found = self._without_failed(self._sample(self._cloud(pictures)))
         quality = self._ranking(pictures, found) if len(found) else np.empty(0)
@@ -207,7 +208,7 @@ class GlobalPhase:
             if not self._robot.reachable(pose):
                 continue
             if travel(pose) is not None:
-                continue  # something is in the way: look from where others are
+                continue  # the gripper touched something on the way: leave this place out
             picture = self._eyes.wrist(place, self._policy.wrist_view_m / 2)
             if picture is None:
                 return Cause.CAMERA_STOPPED
@@ -233,18 +234,21 @@ class GlobalPhase:
         quality: Float[np.ndarray, " k"],
         best_first: Float[np.ndarray, " k"],
     ) -> list[Choice]:
-        """Those whose rigid parts meet nothing, in order."""
+        """Candidates at which the stem touches no measured point, the best first."""
         poses = found.world_from_contact
         free = free_of_collision(poses, cloud.points_m, self._config.hand)
         order = np.argsort(-best_first, kind="stable")
         return [Choice(poses[i], float(quality[i])) for i in order if free[i]]
 
     def _rank_unmeasured(self, cloud: Cloud, contacts: Sequence[Pose]) -> list[Choice]:
-        """Those down to which the rigid parts meet nothing measured; what failed before, last."""
+        """Unmeasured contacts that the stem can reach without touching a measured point.
+
+        Those near contacts that failed before come last.
+        """
         poses = np.array(contacts).reshape(-1, 4, 4)
         free = free_of_collision(poses, cloud.points_m, self._config.hand)
         order = np.argsort(~self._not_failed(poses[:, :3, 3]), kind="stable")
-        return [Choice(poses[i], 0.0, felt_for=True) for i in order if free[i]]
+        return [Choice(poses[i], 0.0, unmeasured=True) for i in order if free[i]]
 
     def _cloud(self, pictures: Sequence[DepthPicture]) -> Cloud:
         return merged_cloud(pictures, self._policy.voxel_m, self._policy.above_table_m)
@@ -273,7 +277,7 @@ class GlobalPhase:
         )
 
     def _without_failed(self, found: Candidates) -> Candidates:
-        """Without those too near to a contact that failed before; all, where no other is left."""
+        """Candidates that are not near a contact that failed before; all where none is left."""
         fresh = self._not_failed(found.world_from_contact[:, :3, 3])
         return found.take(fresh) if fresh.any() else found
 

@@ -16,17 +16,17 @@ from pipeline.config.policy import MotionConfig
 
 
 class Motion:
-    """Velocity of what lies around the aim; pictures are one or more control periods apart."""
+    """Velocity of the object around the aim; pictures are one or more control periods apart."""
 
     def __init__(self, period_s: float, seen_m: float, config: MotionConfig) -> None:
-        """Nothing has been seen yet.
+        """Start without any picture.
 
         Parameters
         ----------
         period_s
             Time between two control steps [s].
         seen_m
-            How far around the aim, level, a picture shows all there is [m].
+            Horizontal distance from the aim within which a picture shows everything [m].
         config
             Cells and thresholds.
         """

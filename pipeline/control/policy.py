@@ -1,14 +1,17 @@
 """One attempt, from the first picture to the lifted object or the cause of the failure.
 
-Global phase: clouds of several viewpoints are merged, u candidates sampled and ranked in one
-batch; those the robot cannot reach or that would collide are left out. Local phase: the wrist's
-camera takes a picture at every control step, and the contact is corrected, until the camera is
-too near; then the gripper goes straight on until contact. After that the wrench decides
-(Supplement VI): an object that the first tug does not hold is grasped once more, nearer to its
-centre of mass where the wrench showed where that is, otherwise at the next best place. An object
-that colour shows and depth does not is approached straight down until contact, where no measured
-contact is left. `pipeline.control.robot` defines what the policy needs of the world,
-`pipeline.control.decision` the ways to end.
+Global phase: the policy merges the clouds of several viewpoints, samples u candidates, and ranks
+them in one batch. It leaves out candidates that the robot cannot reach or at which the gripper
+would collide. Local phase: the wrist's camera takes a picture at every control step, and the policy
+corrects the contact, until the camera is too near; then the gripper goes straight on until contact.
+
+After the contact the wrench is used (Supplement VI). If the first tug shows that the object is not
+held, it is grasped once more: nearer to its centre of mass where the wrench gave that, otherwise at
+the next best place. An object that only the colour pictures show is tried when no measured contact
+is left; the gripper then goes straight down until contact.
+
+`pipeline.control.robot` defines the cameras and the robot that the policy uses,
+`pipeline.control.decision` the causes with which an attempt ends.
 """
 
 from collections.abc import Callable, Sequence
@@ -72,14 +75,14 @@ class Attempt:
         self._new_choices_left = config.policy.new_choices
         self._retargets_left = config.policy.retargets if strategy.corrects else 0
         self._regrasps_left = config.policy.regrasps if strategy.seals_again else 0
-        self._felt_for = False
+        self._aim_unmeasured = False
         self.decision = Decision()
 
     def run(self) -> Decision:
         """Make the attempt, and return what was decided and why it ended."""
-        cause = self._through(
+        cause = self._run_phases(
             (State.OBSERVE, self._choose),
-            *self._to_the_seal(),
+            *self._phases_to_seal(),
             (State.LIFT, self._lift),
             (State.SHAKE, self._shake),
             (State.TRANSPORT, self._transport),
@@ -88,15 +91,15 @@ class Attempt:
         self.decision.cause = cause or Cause.LIFTED
         return self.decision
 
-    def _to_the_seal(self) -> tuple[Phase, ...]:
+    def _phases_to_seal(self) -> tuple[Phase, ...]:
         return (
             (State.PREGRASP, self._go_above),
             (State.APPROACH, self._approach),
             (State.SEAL, self._seal),
         )
 
-    def _through(self, *phases: Phase) -> Cause | None:
-        """One phase after the other, until one ends with a cause."""
+    def _run_phases(self, *phases: Phase) -> Cause | None:
+        """Run the phases one after the other; stop at the first that returns a cause."""
         for state, phase in phases:
             self._robot.enter(state)
             cause = phase()
@@ -105,7 +108,7 @@ class Attempt:
         return None
 
     def _choose(self) -> Cause | None:
-        """The global phase: look from several viewpoints, then take the best that can be had."""
+        """The global phase: take pictures, then aim at the best contact that can be reached."""
         return self._choose_from(several_views=self._strategy.several_views)
 
     def _choose_from(self, several_views: bool) -> Cause | None:
@@ -115,7 +118,7 @@ class Attempt:
         return None if self._aim_at(self._global.best(least=0.0)) else Cause.UNREACHABLE
 
     def _retarget(self) -> bool:
-        """Whether, seen from near, the aim promises clearly less than another; then aim there."""
+        """Aim at another contact if its q-hat is clearly higher now; whether there was one."""
         if self._retargets_left == 0:
             return False
         wanted = self.decision.predicted_quality + self._policy.retarget_gain
@@ -136,7 +139,7 @@ class Attempt:
         for _ in range(round(self._policy.approach_max_s * self._policy.rate_hz)):
             aim = self.decision.world_from_contact
             here = self._robot.pose()
-            if self._strategy.corrects and not self._felt_for and self._sees(aim, here):
+            if self._strategy.corrects and not self._aim_unmeasured and self._sees(aim, here):
                 cause = self._correct()
                 if cause is None and self._retarget():
                     cause = self._go_above()
@@ -162,13 +165,16 @@ class Attempt:
         return Cause.NO_CONTACT
 
     def _search_m(self) -> float:
-        """How far past the expected contact the pad goes on; feeling for it, down to the table."""
-        if not self._felt_for:
+        """Distance past the expected contact at which the pad stops [m].
+
+        Where the contact was not measured, that is below the table.
+        """
+        if not self._aim_unmeasured:
             return self._policy.search_m
         return self._policy.search_m + float(self.decision.world_from_contact[2, 3])
 
     def _sees(self, aim: Float[np.ndarray, "4 4"], here: Float[np.ndarray, "4 4"]) -> bool:
-        """Whether the aim is not too near: for the wrist's camera, or to go elsewhere."""
+        """Whether the aim is far enough away for the wrist's camera to see it, and to change it."""
         if way_left_m(aim, here) < self._policy.commit_m:
             return False
         camera = self._eyes.wrist_camera(here)
@@ -176,7 +182,7 @@ class Attempt:
         return bool(distance >= camera.near_m + self._policy.correction_radius_m)
 
     def _correct(self) -> Cause | None:
-        """Look again and take the best contact near the one aimed at, where it promises more."""
+        """Take a picture and aim at the best contact near the present one, if it is better."""
         aim = self.decision.world_from_contact
         picture = self._eyes.wrist(aim[:3, 3], self._policy.look_m)
         if picture is None:
@@ -190,9 +196,9 @@ class Attempt:
         return None
 
     def _choose_anew(self) -> Cause | None:
-        """Choose again, from the cameras beside the table alone: nothing is left near the aim.
+        """Choose a contact again from pictures of the static cameras, as none is left near the aim.
 
-        Where that finds nothing either, the aim stays.
+        Where there is none in them either, the aim stays.
         """
         self._new_choices_left -= 1
         cause = self._choose_from(several_views=False)
@@ -203,8 +209,9 @@ class Attempt:
     def _seal(self) -> Cause | None:
         """Switch the vacuum on and lift a little: an object that is held pulls on the gripper.
 
-        Where it pulled and broke away, it was held too far from its centre of mass: try nearer to
-        that. Where nothing pulled, or nothing is nearer: try the next best place.
+        An object that pulled and then broke away was held too far from its centre of mass, so the
+        next try is nearer to that. If nothing pulled, or no contact is nearer, the next try is at
+        the next best place.
         """
         self._robot.vacuum(on=True)
         self.decision.seals += 1
@@ -221,28 +228,28 @@ class Attempt:
             return Cause.NO_SEAL
         self._regrasps_left -= 1
         self.decision.regrasps += 1
-        return self._through(*self._to_the_seal())
+        return self._run_phases(*self._phases_to_seal())
 
     def _aim_nearer(self, felt: Reading) -> bool:
-        """Whether there is a contact nearer to where the load hangs; then aim there."""
+        """Aim at a contact nearer to the object's centre of mass; whether there was one."""
         if not (self._strategy.feels and self._monitor.holds(felt)):
             return False
         place = load_place_m(felt, self._config.hand.length_m)
         lever_m = float(np.linalg.norm(place - felt.world_from_gripper[:2, 3]))
         if lever_m < self._policy.regrasp_lever_m:
-            return False  # it is the seal that is weak
+            return False  # it was held at its centre of mass: the seal itself is weak
         if not self._aim_at(self._global.nearer_to(place, lever_m, self.decision.pictures)):
             return False
-        self._retargets_left = 0  # what is felt outweighs what is seen
+        self._retargets_left = 0  # a choice by the wrench is not changed by pictures
         return True
 
     def _aim_elsewhere(self) -> bool:
-        """Whether a place is left that promises enough; then aim there."""
+        """Aim at the best contact left, if its q-hat is high enough; whether there was one."""
         self._global.reject(self.decision.failed_contacts_m)
         return self._aim_at(self._global.best(self._policy.regrasp_quality))
 
     def _lift(self) -> Cause | None:
-        """Up, trimming the pose to lessen moments at the base; slower after a slip."""
+        """Lift the object; tilt the gripper to reduce moments at its base; slower after a slip."""
         start = self._robot.pose()
         height, speed = 1.3 * self._config.lift.height_m, self._policy.speed_m_s
         left = self._policy.trim_max_rad if self._strategy.feels else 0.0
@@ -269,7 +276,7 @@ class Attempt:
         return None if self._monitor.holds(reading) else Cause.LOST_IN_SHAKE
 
     def _transport(self) -> Cause | None:
-        """Aside and back at each acceleration, one after the other."""
+        """Carry the object aside and back at each acceleration, one after the other."""
         for acceleration_m_s2 in self._config.transport.accelerations_m_s2:
             if not self._monitor.holds(self._robot.carry(acceleration_m_s2)):
                 return Cause.LOST_IN_TRANSPORT
@@ -277,7 +284,7 @@ class Attempt:
         return None
 
     def _travel(self, pose: Float[np.ndarray, "4 4"]) -> Cause | None:
-        """Through free space to a pose."""
+        """Move through free space to a pose."""
         while True:
             reading = self._robot.step(pose, self._policy.travel_m_s)
             event = self._monitor.moving(reading)
@@ -298,7 +305,7 @@ class Attempt:
         if choice is None:
             return False
         self._aim(choice.world_from_contact, choice.quality)
-        self._felt_for = choice.felt_for
+        self._aim_unmeasured = choice.unmeasured
         self._local.start_over()
         return True
 

@@ -1,4 +1,4 @@
-"""What makes a candidate good: the network's q-hat, or the plain geometry of a baseline."""
+"""Values by which candidates are ranked: the network's q-hat, or the geometry of a baseline."""
 
 from collections.abc import Callable, Sequence
 from typing import Protocol
@@ -15,7 +15,7 @@ from pipeline.sensing.sub_cloud import merged_sub_clouds
 Predict = Callable[
     [Float[np.ndarray, "n g g 3"], Bool[np.ndarray, "n g g"]], Float[np.ndarray, " n"]
 ]
-"""q-hat of sub clouds, in units of r_G, and of the cells that are seen."""
+"""Function of sub clouds in units of r_G and of their seen cells; returns q-hat."""
 
 
 class Ranking(Protocol):
@@ -61,7 +61,25 @@ def smooth_quality(
     within_m: float,
     within_rad: float,
 ) -> Float[np.ndarray, " k"]:
-    """Mean over neighbours, weighted by exp(-(distance / within)^2); like approaches alone."""
+    """Average the quality of each candidate with that of its neighbours.
+
+    The weights are exp(-(distance / within_m)^2).
+
+    Parameters
+    ----------
+    candidates
+        The k candidates.
+    quality
+        Quality of each, shape (k,).
+    within_m
+        Radius of the average [m]; 0: no average.
+    within_rad
+        Only candidates whose approaches differ by less than this angle count [rad].
+
+    Returns
+    -------
+    The averages, shape (k,).
+    """
     if within_m == 0.0 or len(quality) == 0:
         return quality
     place = candidates.world_from_contact[:, :3, 3]
@@ -74,10 +92,10 @@ def smooth_quality(
 class GeometricRanking:
     """The geometric picker: the flattest place for the pad among those at the highest point.
 
-    Flatness is exp(-roughness over `roughness_m`) times the share that is seen of the pad's sealing
-    region, r_v; roughness is the root mean square height of that region about its mean, along the
-    approach. What is within `band_m` of the highest candidate ranks by it, all others below these,
-    the higher the better.
+    Flatness is exp(-roughness / `roughness_m`) times the share of the pad's sealing region, r_v,
+    that the pictures show. Roughness is the root mean square height of that region about its mean,
+    along the approach. Candidates within `band_m` of the highest one are ranked by flatness. All
+    others have lower values, which fall with their distance below the highest one.
     """
 
     def __init__(self, config: PickerConfig, sensing: SensingConfig, pad: PadConfig) -> None:

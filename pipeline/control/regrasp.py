@@ -1,8 +1,8 @@
-"""Where a load hangs that broke away from the pad, and contacts nearer to that place.
+"""Centre of mass of an object that broke away from the pad, and contacts nearer to it.
 
 Supplement VI: the wrench serves to «minimize the moments on the gripper base during grasping». A
-pad bears far less moment than pull, so a heavy object must be held near its centre of mass. No
-picture shows it; the wrench during a first tug does.
+pad bears far less moment than pull, so a heavy object must be held near its centre of mass. That is
+computed from the wrench during the first tug, as no picture shows it.
 """
 
 import numpy as np
@@ -16,9 +16,20 @@ from pipeline.control.wrench_monitor import line_of_load
 
 
 def load_place_m(felt: Reading, base_above_pad_m: float) -> Float[np.ndarray, " 2"]:
-    """Horizontal place in WCS of the line on which the load's weight acts: its centre of mass.
+    """Horizontal place of the load's centre of mass, from the wrench.
 
-    The line of action of the force at the base, followed to the height of the pad.
+    It is where the line of action of the force at the base is at the height of the pad.
+
+    Parameters
+    ----------
+    felt
+        Pose and wrench while the object pulled.
+    base_above_pad_m
+        Distance from the pad to the base, where the wrench is measured [m].
+
+    Returns
+    -------
+    x and y in WCS [m], shape (2,).
     """
     pose = felt.world_from_gripper
     on_line = np.array([0.0, 0.0, base_above_pad_m]) + line_of_load(felt.wrench)
@@ -46,7 +57,7 @@ def worth_with_lever(
     lever_m: float,
     config: PolicyConfig,
 ) -> Float[np.ndarray, " k"]:
-    """q-hat, reduced with the distance from where the load hangs; 0 where it is hardly nearer.
+    """q-hat, reduced with the distance from the load's centre of mass; 0 where it is hardly nearer.
 
     Parameters
     ----------
@@ -55,7 +66,7 @@ def worth_with_lever(
     candidates
         Contacts to choose among.
     place_m
-        Where the load hangs, horizontally in WCS [m], shape (2,).
+        Horizontal place of the load's centre of mass in WCS [m], shape (2,).
     lever_m
         Horizontal lever of the contact that did not hold [m].
     config

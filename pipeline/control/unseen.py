@@ -23,9 +23,20 @@ TABLE = 0  # instance of the table and of nothing
 def unseen_contacts(
     pictures: Sequence[DepthPicture], config: UnseenConfig, above_table_m: float
 ) -> list[Float[np.ndarray, "4 4"]]:
-    """A level contact on top of each object that depth does not show; world_from_contact.
+    """Find a contact on top of each object that the depth images do not show.
 
-    An object's pixels are counted over all pictures; those without instances tell nothing.
+    Parameters
+    ----------
+    pictures
+        Pictures of one scene; those without a segmentation are not used.
+    config
+        Shares, and size and cells of the visual hull.
+    above_table_m
+        Points above this height in WCS count as measured on an object [m].
+
+    Returns
+    -------
+    world_from_contact of each object, level, shape (4, 4).
     """
     segmented = [picture for picture in pictures if picture.instances is not None]
     unseen = unseen_instances(segmented, config, above_table_m)
@@ -36,7 +47,7 @@ def unseen_contacts(
 def unseen_instances(
     pictures: Sequence[DepthPicture], config: UnseenConfig, above_table_m: float
 ) -> list[int]:
-    """Instances of whose pixels, over all pictures, too few were measured above the table."""
+    """Instances of which too small a share of pixels, over all pictures, lies above the table."""
     shown: Counter[int] = Counter()
     above: Counter[int] = Counter()
     for picture in pictures:
@@ -57,9 +68,23 @@ def unseen_instances(
 def hull_top(
     pictures: Sequence[DepthPicture], name: int, config: UnseenConfig
 ) -> Float[np.ndarray, "4 4"] | None:
-    """The contact, level, over the middle of an instance's visual hull; None where there is none.
+    """Find a level contact on top of the middle of an instance's visual hull.
 
-    A picture that was cut off short of a place, or shows something before it, says nothing of it.
+    A place counts as inside the hull also where a picture does not show it, because it lies outside
+    the picture or behind another object.
+
+    Parameters
+    ----------
+    pictures
+        Pictures with a segmentation.
+    name
+        The instance.
+    config
+        Size and cells of the grid of places.
+
+    Returns
+    -------
+    world_from_contact, shape (4, 4); None where no picture shows the instance or the hull is empty.
     """
     outlines = [(picture, _instances(picture) == name) for picture in pictures]
     outlines = [(picture, mask) for picture, mask in outlines if mask.any()]
@@ -80,7 +105,7 @@ def hull_top(
 def _places(
     picture: DepthPicture, mask: Bool[np.ndarray, "h w"], config: UnseenConfig
 ) -> Float[np.ndarray, "n 3"]:
-    """Where the object may be: a grid over what its outline covers of the table, and around it."""
+    """Grid of places where the object may be [m]: over its outline on the table and around that."""
     eye, rays = pixel_rays(picture.camera, mask)
     down = rays[:, 2] < 0
     if not down.any():
@@ -97,7 +122,7 @@ def _places(
 def _within(
     picture: DepthPicture, mask: Bool[np.ndarray, "h w"], places_m: Float[np.ndarray, "n 3"]
 ) -> Bool[np.ndarray, " n"]:
-    """Whether a picture shows each place within the outline, or does not show it at all."""
+    """Whether each place is within the outline in a picture, or is not visible in it."""
     pixels, z = project(picture.camera, places_m)
     shown = in_picture(picture.camera, pixels)
     column, row = np.floor(pixels[shown]).astype(np.int64).T

@@ -1,4 +1,4 @@
-"""Poses of the gripper for pictures of the wrist's camera, and where an approach begins."""
+"""Poses of the gripper: those from which the wrist's camera looks, and those before a contact."""
 
 import numpy as np
 from jaxtyping import Float
@@ -7,7 +7,23 @@ from jaxtyping import Float
 def choose_apart(
     places_m: Float[np.ndarray, "k 3"], quality: Float[np.ndarray, " k"], count: int, apart_m: float
 ) -> list[Float[np.ndarray, " 3"]]:
-    """The most promising places, each at least ``apart_m`` from those before; at most ``count``."""
+    """Choose the places of highest quality that are not close to each other.
+
+    Parameters
+    ----------
+    places_m
+        Places in WCS [m], shape (k, 3).
+    quality
+        Quality of each, shape (k,).
+    count
+        Greatest number of places.
+    apart_m
+        Least distance between two of them [m].
+
+    Returns
+    -------
+    The chosen places, the best first.
+    """
     chosen: list[Float[np.ndarray, " 3"]] = []
     for index in np.argsort(-quality, kind="stable"):
         if len(chosen) == count:
@@ -20,7 +36,21 @@ def choose_apart(
 def gripper_above(
     place_m: Float[np.ndarray, " 3"], height_m: float, before: Float[np.ndarray, "4 4"]
 ) -> Float[np.ndarray, "4 4"]:
-    """The gripper upright above a place; about the vertical it stays as it was before."""
+    """Pose of the gripper above a place, pad facing down, with the heading of another pose.
+
+    Parameters
+    ----------
+    place_m
+        The place in WCS [m], shape (3,).
+    height_m
+        Height of the pad above it [m].
+    before
+        world_from_gripper that gives the heading, shape (4, 4).
+
+    Returns
+    -------
+    world_from_gripper, shape (4, 4).
+    """
     pose = np.eye(4)
     heading = np.arctan2(before[1, 0], before[0, 0])
     cosine, sine = np.cos(heading), np.sin(heading)
@@ -33,7 +63,7 @@ def gripper_above(
 def turn_half_about_approach(
     world_from_gripper: Float[np.ndarray, "4 4"],
 ) -> Float[np.ndarray, "4 4"]:
-    """The pose turned by half a turn about its approach: the wrist's camera looks from opposite."""
+    """The pose turned by half a turn about its approach: the camera is then on the other side."""
     return np.asarray(world_from_gripper * np.array([-1.0, -1.0, 1.0, 1.0]))
 
 
@@ -42,7 +72,7 @@ def turn_least(
 ) -> Float[np.ndarray, "4 4"]:
     """The pose turned about its approach axis so that the wrist turns as little as possible.
 
-    The pad is round, so the angle about the axis is free; this choice makes the arm's way shortest.
+    The pad is round, so the angle about the axis is free.
     """
     z = world_from_contact[:3, 2]
     x = before[:3, 0] - (before[:3, 0] @ z) * z
@@ -58,7 +88,7 @@ def turn_least(
 def back_off(
     world_from_contact: Float[np.ndarray, "4 4"], distance_m: float
 ) -> Float[np.ndarray, "4 4"]:
-    """The pose moved by a distance [m] against its approach direction; negative: ahead."""
+    """The pose moved back by a distance [m], against its approach; forward where it is negative."""
     pose = world_from_contact.copy()
     pose[:3, 3] += distance_m * pose[:3, 2]
     return pose

@@ -1,4 +1,4 @@
-"""Events told from the wrench at the gripper's base: contact, collision, seal, slip, loss.
+"""Events that the wrench at the gripper's base shows: contact, collision, seal, slip, loss.
 
 Supplement VI: the force-torque wrench is «mainly utilized to monitor the grasp status, like
 collision and grasp success, optimize the robotic motion, and minimize the moments on the gripper
@@ -74,7 +74,7 @@ def trim_pose(
     left_rad: float,
     config: PolicyConfig,
 ) -> tuple[Float[np.ndarray, "4 4"], float]:
-    """Turn the pose about the pad so that the moment at the base falls.
+    """Turn the pose about the pad so that the moment at the base becomes smaller.
 
     A load F at r from the base has the moment M = r x F. A turn by a small angle about M moves the
     load's line nearer to the base, by the angle times the load's depth below it. Torsion about the

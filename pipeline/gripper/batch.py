@@ -33,10 +33,24 @@ class LabelBatch:
 
     Attributes
     ----------
+    q
+        Grasp quality in [0, 1], S-1.12, shape (batch,).
+    pressure
+        p of Eq. (2) [1], shape (batch,).
+    wrench
+        GW, dimensionless, shape (batch, 4).
+    slacks
+        Slack of each limit of Eq. (8)-(11), as in `limits.limit_slacks`, shape (batch, 8).
     weights
-        Least, greatest and root-mean-square deviation from 1 of W.
+        Least, greatest and root-mean-square deviation from 1 of W, shape (batch, 3).
+    contact
+        Whether each vertex of the pad is in contact with the target, shape (batch, vertices).
+    touch_height_m
+        Highest point of the scene under the pad [m], shape (batch,); -inf over nothing.
     status
-        Values of `GraspStatus`.
+        Values of `GraspStatus`, shape (batch,).
+    iterations
+        The solver's iterations, shape (batch,).
     """
 
     q: Float[np.ndarray, " batch"]
@@ -57,8 +71,8 @@ class LabelBatch:
         return LabelBatch(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
     @staticmethod
-    def joined(parts: Sequence["LabelBatch"]) -> "LabelBatch":
-        """Several batches as one, in order; at least one."""
+    def join(parts: Sequence["LabelBatch"]) -> "LabelBatch":
+        """Join several batches, in their order; at least one."""
         return LabelBatch(
             *(
                 np.concatenate([getattr(part, field.name) for part in parts])

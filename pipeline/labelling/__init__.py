@@ -1,7 +1,7 @@
-"""Algorithm 1 of the supplement: where grasps are tried, and their labels.
+"""Algorithm 1 of the supplement: proposes grasps and labels them.
 
-`label_mesh` labels one mesh at given poses; `label_scene` proposes grasps on a scene, labels them,
-and cuts the clouds that its cameras measured around them.
+`label_mesh` labels grasps of one mesh at given poses. `label_scene` proposes grasps on a scene,
+labels them, and cuts the clouds that the cameras measured around them.
 """
 
 from pipeline.gripper import GraspStatus, LabelBatch

@@ -1,4 +1,4 @@
-"""What the cameras measured around each labelled grasp: S-1.13 - S-1.15."""
+"""Point clouds that the cameras measured around each labelled grasp: S-1.13 - S-1.15."""
 
 from collections.abc import Sequence
 
@@ -15,14 +15,14 @@ Picture = tuple[Float[np.ndarray, "_ _"], PinholeCamera]
 """Measured depth [m], 0 where nothing was measured, and the camera that took it."""
 
 
-def measured_pictures(
+def measure_pictures(
     views: Sequence[CameraView], disturbed: bool, rng: np.random.Generator
 ) -> list[Picture]:
-    """S-1.13 - S-1.15: the cameras' depth images, with their sensors' noise if ``disturbed``."""
+    """Depth pictures of the views (S-1.13), with the sensors' noise (S-1.15) if ``disturbed``."""
     return [(disturb(view, rng) if disturbed else view.depth_m, view.camera) for view in views]
 
 
-def clouds_around(
+def cut_clouds(
     world_from_contact: Float[np.ndarray, "n 4 4"],
     picture: Picture,
     pictures: Sequence[Picture],
@@ -33,16 +33,18 @@ def clouds_around(
     Bool[np.ndarray, "n g g"],
     Int[np.ndarray, " n"],
 ]:
-    """S-1.14, S-1.15: Transform and Desample, from all pictures for some, from one for the rest.
+    """Cut a cloud around each contact (Transform, Desample; S-1.14, S-1.15).
+
+    A random part of the clouds is cut from all pictures of the scene, the others from one.
 
     Parameters
     ----------
     world_from_contact
-        Where each cloud is cut, shape (n, 4, 4).
+        Frame of each contact, shape (n, 4, 4); the cloud is cut around its origin.
     picture
-        Of the view that proposed the grasps.
+        Picture of the view in which the grasps were proposed.
     pictures
-        Of all views of the scene, for ``grasps.merged_share`` of the clouds.
+        Pictures of all views of the scene; ``grasps.merged_share`` of the clouds use them all.
     config
         Sections sensing, grasps and gripper.
     rng
@@ -51,7 +53,7 @@ def clouds_around(
     Returns
     -------
     Clouds in units of r_G, shape (n, g, g, 3); the cells that hold a measured point, shape
-    (n, g, g); and from how many pictures each was cut, shape (n,).
+    (n, g, g); and the number of pictures that each was cut from, shape (n,).
     """
     merged = rng.random(len(world_from_contact)) < config.grasps.merged_share
     cells = config.sensing.grid_cells

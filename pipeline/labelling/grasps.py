@@ -1,4 +1,4 @@
-"""Labelled grasps as data: where each is, what its label says, and what a camera saw there."""
+"""Labelled grasps as arrays: the pose of each, its label, and the cloud measured around it."""
 
 from dataclasses import dataclass, fields
 
@@ -8,30 +8,46 @@ from jaxtyping import Bool, Float, Integer
 
 @dataclass(frozen=True)
 class LabelledGrasps:
-    """Grasps of one scene seen from one viewpoint; arrays of one length n.
+    """Grasps of one scene that were proposed from one viewpoint; arrays of one length n.
 
     Attributes
     ----------
+    object_index
+        Index of the grasped object in `GraspOrigin.object_names`, shape (n,).
+    body_id
+        Body id of the grasped object in its scene, shape (n,).
     world_from_gripper
-        (n, 4, 4) GCS at first touch, in WCS.
-    quality, pressure
-        (n,) q of S-1.12 and p of Eq. (2).
+        Pose of GCS at first touch, in WCS, shape (n, 4, 4).
+    quality
+        q of S-1.12, shape (n,).
+    pressure
+        p of Eq. (2), shape (n,).
     wrench
-        (n, 4) GW, dimensionless.
+        GW, dimensionless, shape (n, 4).
     limit_slack
-        (n, 8) room to Eq. (8)-(11).
+        Slack of each limit of Eq. (8)-(11), shape (n, 8); columns as `GraspOrigin.limit_names`.
     weight_summary
-        (n, 3) least, greatest and rms deviation from 1 of W.
+        Least, greatest and root-mean-square deviation from 1 of W, shape (n, 3).
     contact_mask
-        (n, v) pad vertices in contact.
-    tilt_rad, proposal, keep_probability
-        The sampler's bias.
-    cloud, cloud_mask
-        (n, g, g, 3) and (n, g, g), units of r_G, origin at the contact.
+        Whether each of the pad's v vertices is in contact with the target, shape (n, v).
+    status
+        Index of the solver's status in `GraspOrigin.status_names`, shape (n,).
+    iterations
+        The solver's iterations, shape (n,).
+    tilt_rad
+        Angle between d_G and the mean normal [rad], shape (n,).
+    proposal
+        Index of the proposing rule in `GraspOrigin.proposal_names`, shape (n,).
+    keep_probability
+        Share of the labels in the same tenth of [0, 1] that balancing kept, shape (n,).
+    cloud
+        Points in units of r_G, origin at the contact, shape (n, g, g, 3).
+    cloud_mask
+        Cells of the cloud that hold a measured point, shape (n, g, g).
     touch_height_m
-        (n,) first touch above the contact.
+        Height of the first touch above the contact, along d_G [m], shape (n,).
     pictures
-        (n,) how many pictures the cloud was cut from: one, or all of the scene.
+        Number of pictures that the cloud was cut from, shape (n,): one, or all of the scene.
     """
 
     object_index: Integer[np.ndarray, " n"]
@@ -57,13 +73,33 @@ class LabelledGrasps:
         return len(self.quality)
 
     def rows(self, start: int, stop: int) -> "LabelledGrasps":
-        """A contiguous part."""
+        """Rows from ``start`` up to, but not including, ``stop``."""
         return LabelledGrasps(*(getattr(self, f.name)[start:stop] for f in fields(self)))
 
 
 @dataclass(frozen=True)
 class GraspOrigin:
-    """What the grasps of one batch have in common, and the names its indices point into."""
+    """Scene and viewpoint of the grasps of one batch, and the names that its indices refer to.
+
+    Attributes
+    ----------
+    scene_id
+        The scene.
+    viewpoint
+        Name of the camera.
+    level
+        Level of the scene, 1 to 9.
+    split
+        "train", "val" or "test".
+    object_names
+        Names of the scene's objects, sorted.
+    limit_names
+        Names of the columns of `LabelledGrasps.limit_slack`.
+    status_names
+        Names of the solver's statuses.
+    proposal_names
+        Names of the proposing rules.
+    """
 
     scene_id: str
     viewpoint: str

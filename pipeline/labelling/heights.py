@@ -20,11 +20,11 @@ def pad_heights(
     world_from_contact
         Pose of each grasp, shape (n, 4, 4); the pad approaches along -z.
     surfaces
-        What the pad may meet.
+        Everything that the pad may touch.
     pad
         The pad in GCS, of v vertices.
     clearance_m
-        How far above the origin rays begin [m]: what lies higher is not met.
+        Height above the origin at which rays begin [m]; they miss everything higher.
 
     Returns
     -------

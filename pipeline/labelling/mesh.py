@@ -1,4 +1,4 @@
-"""Algorithm 1 on one mesh at poses that the caller gives."""
+"""Algorithm 1 on one mesh, at poses that the caller gives."""
 
 from pathlib import Path
 
@@ -50,9 +50,9 @@ def load_mesh(path: Path | str, config: ObjectsConfig | None = None) -> Mesh:
 def label_mesh(
     mesh: Mesh, object_from_gripper: ArrayLike, config: RunConfig | None = None
 ) -> LabelBatch:
-    """How well the gripper would hold a mesh at each pose: S-1.07 - S-1.12.
+    """Label grasps of a mesh at given poses: S-1.07 - S-1.12.
 
-    The object is alone: no table and no neighbour holds the pad up.
+    The mesh is the only body: no table and no neighbour supports the pad.
 
     Parameters
     ----------
@@ -92,12 +92,12 @@ def label_mesh(
 
 
 def rigid_poses(poses: ArrayLike) -> Float[np.ndarray, "n 4 4"]:
-    """Poses as float64, once they are found to be rigid.
+    """Check that poses are rigid motions and return them as float64.
 
     Parameters
     ----------
     poses
-        What is to be (n, 4, 4) homogeneous matrices.
+        Homogeneous matrices, shape (n, 4, 4).
 
     Returns
     -------
@@ -126,6 +126,7 @@ def rigid_poses(poses: ArrayLike) -> Float[np.ndarray, "n 4 4"]:
 
 
 def _refuse_bad_mesh(mesh: Mesh) -> None:
+    """Raise MeshError where a mesh is empty, has wrong indices or is not finite."""
     if len(mesh.faces) == 0:
         raise MeshError("The mesh has no faces", "Give a surface: a point cloud must be meshed")
     if mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices_m):
@@ -139,5 +140,6 @@ _REMEDY = "Give rigid object_from_gripper poses, (n, 4, 4), in metres, +z out of
 
 
 def _refuse_first(bad: Bool[np.ndarray, " n"], why: str) -> None:
+    """Raise PoseError for the first bad pose, if there is any."""
     if bad.any():
         raise PoseError(f"Pose {int(np.argmax(bad))} {why}", _REMEDY)

@@ -1,4 +1,4 @@
-"""Labels at given poses on given surfaces: S-1.07 - S-1.12, whoever chose the poses."""
+"""Labels at given poses on given surfaces: S-1.07 - S-1.12."""
 
 from functools import lru_cache
 
@@ -15,7 +15,7 @@ ROUND = 512  # grasps labelled at once: bounds the memory of their rays
 
 @lru_cache(maxsize=4)
 def pad_of(config: PadConfig) -> Pad:
-    """S-1.02, S-1.03: the pad in GCS, within Table I's steps, built once a process."""
+    """The pad of a configuration in GCS (S-1.02, S-1.03), built once in each process."""
     return build_pad(config)
 
 
@@ -26,7 +26,7 @@ def label_poses(
     config: GripperConfig,
     clearance_m: float,
 ) -> LabelBatch:
-    """Label grasps where they are: the pad's heights by rays, then `label_batch`.
+    """Label grasps: find the heights under the pad by rays, then call `label_batch`.
 
     Parameters
     ----------
@@ -34,14 +34,14 @@ def label_poses(
         Pose of each grasp in the frame of ``surfaces``, shape (n, 4, 4): origin anywhere on the
         approach, +z out of the object.
     body_id
-        The body each grasp is meant to hold, shape (n,), as ``surfaces`` numbers it. What else
-        lies under the pad holds it up and does not seal.
+        The body that each grasp is to hold, as ``surfaces`` numbers it, shape (n,). Other bodies
+        under the pad support it but are not sealed.
     surfaces
         The true surfaces.
     config
         The gripper.
     clearance_m
-        How far above the origin rays begin [m]: what lies higher is not met.
+        Height above the origin at which rays begin [m]; they miss everything higher.
 
     Returns
     -------
@@ -53,4 +53,4 @@ def label_poses(
         rows = slice(start, start + ROUND)
         heights, below = pad_heights(world_from_gripper[rows], surfaces, pad, clearance_m)
         parts.append(label_batch(pad, config, heights, below == body_id[rows, None]))
-    return LabelBatch.joined(parts)
+    return LabelBatch.join(parts)

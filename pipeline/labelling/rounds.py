@@ -7,12 +7,12 @@ from jaxtyping import Float
 
 from pipeline.config import RunConfig
 from pipeline.gripper import LabelBatch
-from pipeline.labelling.balancing import flattened, rare_grasps
+from pipeline.labelling.balancing import balance_labels, draw_rare_grasps
 from pipeline.labelling.poses import label_poses
 from pipeline.labelling.sampling import (
     Candidates,
     VisibleSurface,
-    joined,
+    join_candidates,
     propose,
     propose_nearby,
 )
@@ -26,9 +26,9 @@ class KeptGrasps:
     Attributes
     ----------
     candidates
-        Where they are.
+        Poses and proposals of the grasps.
     labels
-        What Algorithm 1 says of them.
+        Their labels by Algorithm 1.
     keep_probability
         Share of the labels in the same tenth of [0, 1] that was kept, shape (n,).
     """
@@ -38,14 +38,14 @@ class KeptGrasps:
     keep_probability: Float[np.ndarray, " n"]
 
 
-def kept_grasps(
+def sample_grasps(
     surface: VisibleSurface,
     surfaces: Surfaces,
     config: RunConfig,
     wanted: int,
     rng: np.random.Generator,
 ) -> KeptGrasps:
-    """Try ``grasps.oversampling`` as many grasps as are wanted; keep those that balance labels.
+    """Label ``grasps.oversampling`` times as many grasps as are wanted; keep a balanced subset.
 
     Parameters
     ----------
@@ -62,11 +62,11 @@ def kept_grasps(
 
     Returns
     -------
-    Contacts, their labels, and the chance that each had to be kept.
+    The kept grasps with their labels.
     """
     tried = int(np.ceil(wanted * config.grasps.oversampling))
     candidates, labels = label_rounds(surface, surfaces, config, tried, rng)
-    kept, probability = flattened(labels.q, wanted, config.grasps.balance, rng)
+    kept, probability = balance_labels(labels.q, wanted, config.grasps.balance, rng)
     return KeptGrasps(candidates.take(kept), labels.take(kept), probability)
 
 
@@ -77,7 +77,7 @@ def label_rounds(
     tried: int,
     rng: np.random.Generator,
 ) -> tuple[Candidates, LabelBatch]:
-    """S-1.04 - S-1.12 in two rounds: over all that is seen face on, then near what is rare.
+    """Propose and label grasps in two rounds (S-1.04 - S-1.12); the second is near rare labels.
 
     Parameters
     ----------
@@ -100,15 +100,15 @@ def label_rounds(
     bodies = np.unique(tried_on)
     parts = {int(body): surface.of_body(body) for body in bodies}
     first = tried - int(tried * config.grasps.nearby_share)
-    candidates = joined(
+    candidates = join_candidates(
         [
             propose(parts[int(body)], count, config.grasps, rng)
-            for body, count in zip(bodies, spread_evenly(first, len(bodies)), strict=True)
+            for body, count in zip(bodies, split_evenly(first, len(bodies)), strict=True)
         ]
     )
     labels = label_candidates(candidates, surfaces, config)
-    origins = rare_grasps(labels.q, tried - first, rng)
-    near = joined(
+    origins = draw_rare_grasps(labels.q, tried - first, rng)
+    near = join_candidates(
         [
             propose_nearby(
                 parts[int(body)],
@@ -120,11 +120,11 @@ def label_rounds(
         ]
     )
     near_labels = label_candidates(near, surfaces, config)
-    return joined([candidates, near]), LabelBatch.joined([labels, near_labels])
+    return join_candidates([candidates, near]), LabelBatch.join([labels, near_labels])
 
 
 def label_candidates(candidates: Candidates, surfaces: Surfaces, config: RunConfig) -> LabelBatch:
-    """S-1.07 - S-1.12 for every candidate; see `label_poses`."""
+    """Label every candidate (S-1.07 - S-1.12); see `label_poses`."""
     return label_poses(
         candidates.world_from_contact,
         candidates.body_id,
@@ -134,6 +134,6 @@ def label_candidates(candidates: Candidates, surfaces: Surfaces, config: RunConf
     )
 
 
-def spread_evenly(total: int, parts: int) -> list[int]:
-    """``total`` in ``parts`` whole numbers that differ by one at most."""
+def split_evenly(total: int, parts: int) -> list[int]:
+    """Split ``total`` into ``parts`` whole numbers that differ by at most one."""
     return [total // parts + (i < total % parts) for i in range(parts)]

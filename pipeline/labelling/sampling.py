@@ -1,14 +1,15 @@
 """Where grasps are tried: contacts, approach directions and poses, S-1.04 - S-1.06.
 
-A contact c is a point of the object's surface that the camera can see, for a
-grasp is only ever tried on what was observed; and where the camera sees what
-the pad would meet: around c the picture does not end, and the surface at c and
-every tilted d_G face the camera, for at a slant half of what lies under the pad
-is hidden. The approach d_G is the mean surface normal around c, as the policy
-estimates it (Supplement VI), tilted off it for part of the proposals; the spin
-about d_G is uniform. A second round proposes near grasps whose labels are
-rare, for labels fall from a full seal to none within a few millimetres. Which
-rule proposed a grasp is kept with it.
+A contact c is a point of the object's surface that the camera sees, because the policy can only
+grasp what was observed. The camera must also see the surface around c that the pad would touch, so
+c must fulfil two conditions: it lies at least r_G inside the border of the picture, and the surface
+at c faces the camera. A tilted d_G must face the camera too. On a surface seen at a slant, half of
+what lies under the pad is hidden.
+
+The approach d_G is the mean surface normal around c, as the policy estimates it (Supplement VI).
+Part of the proposals are tilted away from it. The spin about d_G is uniform. Labels fall from a
+full seal to none within a few millimetres, so a second round proposes grasps near those whose
+labels are rare. Each grasp records the rule that proposed it.
 """
 
 from dataclasses import dataclass, replace
@@ -22,7 +23,7 @@ from pipeline.config.grasps import GraspsConfig
 
 
 class Proposal(IntEnum):
-    """The rule that proposed a grasp: the sampler's bias, sample by sample."""
+    """The rule that proposed a grasp; with it a user can correct the sampler's bias."""
 
     NORMAL = 0  # contact uniform over what is seen face on, approach along the mean normal
     TILTED = 1  # the same, approach tilted off the normal
@@ -33,9 +34,18 @@ class Proposal(IntEnum):
 class VisibleSurface:
     """Points of the objects that a camera sees, in WCS.
 
-    points_m : (n, 3) on the true surface. normals : (n, 3) unit, outward.
-    body_id : (n,) which object a point lies on. eye_m : (3,) where the camera is.
-    whole : (n,) the picture shows all around the point, as far as the pad reaches.
+    Attributes
+    ----------
+    points_m
+        Points on the true surface [m], shape (n, 3).
+    normals
+        Unit outward normals there, shape (n, 3).
+    body_id
+        Body id of the object that each point lies on, shape (n,).
+    eye_m
+        Position of the camera [m], shape (3,).
+    whole
+        Whether the picture shows everything within r_G of the point, shape (n,).
     """
 
     points_m: Float[np.ndarray, "n 3"]
@@ -45,7 +55,7 @@ class VisibleSurface:
     whole: Bool[np.ndarray, " n"]
 
     def of_body(self, body_id: int | np.integer) -> "VisibleSurface":
-        """The part that lies on one object."""
+        """The points that lie on one object."""
         mine = self.body_id == body_id
         return replace(
             self,
@@ -56,7 +66,7 @@ class VisibleSurface:
         )
 
     def contacts(self, angle_max_rad: float) -> Int[np.ndarray, " k"]:
-        """Indices of the points where a pad may be tried: whole in the picture, seen face on."""
+        """Indices of the points where grasps may be tried: `whole`, and facing the camera."""
         return np.flatnonzero(
             self.whole & self.seen_face_on(self.points_m, self.normals, angle_max_rad)
         )
@@ -67,7 +77,21 @@ class VisibleSurface:
         approach: Float[np.ndarray, "k 3"],
         angle_max_rad: float,
     ) -> Bool[np.ndarray, " k"]:
-        """Which unit approaches are within the angle off the direction to the camera."""
+        """Whether each approach points to the camera within an angle.
+
+        Parameters
+        ----------
+        points_m
+            Contacts in WCS [m], shape (k, 3).
+        approach
+            Unit vector d_G of each, shape (k, 3).
+        angle_max_rad
+            Greatest angle between d_G and the direction to the camera [rad].
+
+        Returns
+        -------
+        Whether the angle is kept, shape (k,).
+        """
         to_eye = self.eye_m - points_m
         cosine = np.einsum("ij,ij->i", approach, to_eye) / _lengths(to_eye)
         return np.asarray(cosine >= np.cos(angle_max_rad))
@@ -77,8 +101,16 @@ class VisibleSurface:
 class Candidates:
     """Grasps to be labelled; arrays of one length n.
 
-    world_from_contact : (n, 4, 4) origin at the contact c, +z out along d_G (S-1.06).
-    body_id : (n,) the object to be grasped. tilt_rad : (n,) d_G off the mean normal.
+    Attributes
+    ----------
+    world_from_contact
+        Origin at the contact c, +z outwards along d_G (S-1.06), shape (n, 4, 4).
+    body_id
+        Body id of the object to be grasped, shape (n,).
+    tilt_rad
+        Angle between d_G and the mean normal [rad], shape (n,).
+    proposal
+        Values of `Proposal`, shape (n,).
     """
 
     world_from_contact: Float[np.ndarray, "n 4 4"]
@@ -90,7 +122,7 @@ class Candidates:
         return len(self.body_id)
 
     def take(self, chosen: Int[np.ndarray, " k"]) -> "Candidates":
-        """Those at the given indices."""
+        """The candidates at the given indices."""
         return Candidates(
             self.world_from_contact[chosen],
             self.body_id[chosen],
@@ -99,8 +131,8 @@ class Candidates:
         )
 
 
-def joined(parts: list[Candidates]) -> Candidates:
-    """Several sets as one, in order."""
+def join_candidates(parts: list[Candidates]) -> Candidates:
+    """Join several sets of candidates, in their order; at least one."""
     return Candidates(
         np.concatenate([part.world_from_contact for part in parts]),
         np.concatenate([part.body_id for part in parts]),
@@ -112,11 +144,24 @@ def joined(parts: list[Candidates]) -> Candidates:
 def propose(
     surface: VisibleSurface, count: int, config: GraspsConfig, rng: np.random.Generator
 ) -> Candidates:
-    """First round: ``count`` grasps of one object, contacts uniform over what is seen face on.
+    """First round: draw grasps of one object, their contacts uniform over `surface.contacts`.
 
     S-1.04 draws the contact c, S-1.05 the approach d_G, S-1.06 the spin about it.
 
-    surface : points of that object alone, with at least one of its `contacts`.
+    Parameters
+    ----------
+    surface
+        Points of that object only; at least one of them is among its `contacts`.
+    count
+        Number of grasps.
+    config
+        Angles, shares and radii of the sampler.
+    rng
+        Draws contacts, tilts and spins.
+
+    Returns
+    -------
+    ``count`` candidates.
     """
     contacts = surface.contacts(config.seen_angle_max_rad)
     at = contacts[rng.integers(len(contacts), size=count)]
@@ -124,7 +169,7 @@ def propose(
     tilted = rng.random(count) >= config.normal_share
     tilt = np.where(tilted, rng.uniform(0.0, config.tilt_max_rad, count), 0.0)
     approach = tilt_directions(normals, tilt, rng)
-    # Turned too far from the camera: take the normal itself.
+    # An approach that faces away from the camera is replaced by the normal.
     hidden = ~surface.seen_face_on(surface.points_m[at], approach, config.seen_angle_max_rad)
     tilted &= ~hidden
     approach = np.where(tilted[:, None], approach, normals)
@@ -143,12 +188,27 @@ def propose_nearby(
     config: GraspsConfig,
     rng: np.random.Generator,
 ) -> Candidates:
-    """Second round: a small step of contact and approach from each of ``grasps``.
+    """Second round: move contact and approach of each grasp by a small random step.
 
-    surface : points of the object that all ``grasps`` are on. The new contact is one of its
-    `contacts` within ``config.nearby_radius_m`` of the old one (the old one itself where
-    none is), the new approach within ``config.nearby_tilt_rad`` of the old approach, or the
-    mean normal where that would lean too far off it or away from the camera.
+    The new contact is one of the surface's `contacts` within ``config.nearby_radius_m`` of the old
+    one, or the old one where there is none. The new approach is within ``config.nearby_tilt_rad``
+    of the old one; where it would be tilted more than ``config.tilt_max_rad`` or would not face the
+    camera, it is the mean normal.
+
+    Parameters
+    ----------
+    surface
+        Points of the object that all the grasps are on.
+    grasps
+        Grasps of one object.
+    config
+        Angles and radii of the sampler.
+    rng
+        Draws steps and spins.
+
+    Returns
+    -------
+    One candidate for each grasp, in their order.
     """
     count = len(grasps)
     contacts = surface.points_m[surface.contacts(config.seen_angle_max_rad)]
@@ -162,7 +222,7 @@ def propose_nearby(
     normals = mean_normals(surface, contact, config.normal_radius_m)
     cosine = np.clip(np.einsum("ij,ij->i", normals, approach), -1.0, 1.0)
     tilt = np.arccos(cosine)
-    # Off by more than the first round may be: take the normal itself.
+    # An approach that the first round could not have drawn is replaced by the normal.
     may = tilt <= config.tilt_max_rad
     may &= surface.seen_face_on(contact, approach, config.seen_angle_max_rad)
     approach = np.where(may[:, None], approach, normals)
@@ -177,9 +237,21 @@ def propose_nearby(
 def mean_normals(
     surface: VisibleSurface, points_m: Float[np.ndarray, "k 3"], radius_m: float
 ) -> Float[np.ndarray, "k 3"]:
-    """Unit mean of the surface normals within ``radius_m`` of each point (Supplement VI).
+    """Unit mean of the surface normals around each point (Supplement VI).
 
-    Where the mean vanishes, or nothing is near, the nearest point's normal stands.
+    Parameters
+    ----------
+    surface
+        Points with normals.
+    points_m
+        Where the mean is wanted, in WCS [m], shape (k, 3).
+    radius_m
+        Points within this distance count [m].
+
+    Returns
+    -------
+    Unit vectors, shape (k, 3); the nearest point's normal where no point is within the radius or
+    the normals cancel each other.
     """
     tree = cKDTree(surface.points_m)
     near = tree.query_ball_point(points_m, radius_m)
@@ -204,7 +276,21 @@ def tilt_directions(
     tilt_rad: Float[np.ndarray, " n"],
     rng: np.random.Generator,
 ) -> Float[np.ndarray, "n 3"]:
-    """Each unit direction turned by its angle towards a uniformly random side."""
+    """Turn each direction by its angle towards a uniformly random side.
+
+    Parameters
+    ----------
+    directions
+        Unit vectors, shape (n, 3).
+    tilt_rad
+        Angles [rad], shape (n,).
+    rng
+        Draws the sides.
+
+    Returns
+    -------
+    Unit vectors, shape (n, 3).
+    """
     across, side = tangents(directions)
     azimuth = rng.uniform(0.0, 2 * np.pi, len(directions))
     towards = np.cos(azimuth)[:, None] * across + np.sin(azimuth)[:, None] * side
@@ -216,7 +302,21 @@ def contact_frames(
     approach: Float[np.ndarray, "n 3"],
     spin_rad: Float[np.ndarray, " n"],
 ) -> Float[np.ndarray, "n 4 4"]:
-    """world_from_contact with origin c, z along d_G and x turned by the spin about z."""
+    """Build the frame of each contact from c, d_G and the spin (S-1.06).
+
+    Parameters
+    ----------
+    contact_m
+        Contacts c in WCS [m], shape (n, 3).
+    approach
+        Unit vectors d_G, shape (n, 3).
+    spin_rad
+        Turn of the x axis about d_G [rad], shape (n,).
+
+    Returns
+    -------
+    world_from_contact with origin c and z along d_G, shape (n, 4, 4).
+    """
     across, side = tangents(approach)
     frames = np.zeros((len(contact_m), 4, 4))
     cosine, sine = np.cos(spin_rad)[:, None], np.sin(spin_rad)[:, None]
@@ -232,7 +332,7 @@ def tangents(
     normals: Float[np.ndarray, "n 3"],
 ) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"]]:
     """Two unit vectors that make a right-handed frame with each unit normal."""
-    # The world axis least along the normal, so that the cross product never vanishes.
+    # The world axis with the greatest angle to the normal: its cross product is never zero.
     helper = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
     across = np.cross(helper, normals)
     across /= _lengths(across)[:, None]

@@ -1,4 +1,4 @@
-"""Algorithm 1 on a scene: every object, from every viewpoint that sees one."""
+"""Algorithm 1 on a scene: grasps on every object, proposed from every viewpoint."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -10,9 +10,9 @@ from pipeline.errors import SceneError
 from pipeline.geometry.mesh import Mesh
 from pipeline.gripper import GraspStatus
 from pipeline.gripper.limits import LIMIT_NAMES
-from pipeline.labelling.clouds import Picture, clouds_around, measured_pictures
+from pipeline.labelling.clouds import Picture, cut_clouds, measure_pictures
 from pipeline.labelling.grasps import GraspOrigin, LabelledGrasps
-from pipeline.labelling.rounds import KeptGrasps, kept_grasps, spread_evenly
+from pipeline.labelling.rounds import KeptGrasps, sample_grasps, split_evenly
 from pipeline.labelling.sampling import Proposal, VisibleSurface
 from pipeline.world.cameras import pixel_rays, shown_whole
 from pipeline.world.posed_bodies import bodies_at_rest, surfaces_at_rest
@@ -26,12 +26,12 @@ def scene_surfaces(
 ) -> RayScene:
     """The true surfaces of a scene's objects and its table, in WCS.
 
-    S-1.01, each object's pose in SE(3), is where physics left it.
+    The pose of each object (S-1.01) is the one in which the physics simulation came to rest.
 
     Parameters
     ----------
     scene
-        What lies where.
+        The objects and their poses.
     meshes
         Surface of each object by its name, in the object's own frame [m].
     table_side_m
@@ -39,7 +39,7 @@ def scene_surfaces(
 
     Returns
     -------
-    Surfaces by body id, the table as 0.
+    Surfaces for ray casting; hits name the objects by body id and the table by 0.
     """
     return surfaces_at_rest(bodies_at_rest(scene.objects, meshes, table_side_m))
 
@@ -62,13 +62,13 @@ def label_scene(
     config
         Sections grasps, gripper and sensing.
     wanted
-        How many grasps to keep, over all viewpoints.
+        Number of grasps to keep, over all viewpoints.
     rng
-        Draws the sensors' noise, proposals, and what is kept.
+        Draws the sensors' noise, the proposals, and which labels are kept.
 
     Returns
     -------
-    Kept grasps, a batch for each viewpoint that sees a place to try.
+    A batch of kept grasps for each viewpoint that sees at least one possible contact.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def label_scene(
         No camera sees a surface face on and whole in its picture.
     """
     names = tuple(sorted({item.object_name for item in scene.objects}))
-    measured = measured_pictures(scene.views, config.sensing.disturbed, rng)
+    measured = measure_pictures(scene.views, config.sensing.disturbed, rng)
     seen = [visible_surface(view, surfaces, config.gripper.pad.radius_m) for view in scene.views]
     able = [
         number
@@ -92,16 +92,16 @@ def label_scene(
     for item in scene.objects:
         index_of_body[item.body_id] = names.index(item.object_name)
     batches = []
-    for number, share in zip(able, spread_evenly(wanted, len(able)), strict=True):
-        kept = kept_grasps(seen[number], surfaces, config, share, rng)
-        grasps = with_clouds(kept, measured[number], measured, config, rng)
-        origin = origin_of(scene, scene.views[number].camera.name, names)
+    for number, share in zip(able, split_evenly(wanted, len(able)), strict=True):
+        kept = sample_grasps(seen[number], surfaces, config, share, rng)
+        grasps = add_clouds(kept, measured[number], measured, config, rng)
+        origin = grasp_origin(scene, scene.views[number].camera.name, names)
         batches.append((origin, replace(grasps, object_index=index_of_body[grasps.body_id])))
     return batches
 
 
 def visible_surface(view: CameraView, surfaces: Surfaces, radius_m: float) -> VisibleSurface:
-    """What the camera sees of the objects: exact points and normals under its pixels.
+    """Find the exact surface point and normal at each pixel that shows an object.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def visible_surface(view: CameraView, surfaces: Surfaces, radius_m: float) -> Vi
     surfaces
         The true surfaces; the table is body 0.
     radius_m
-        How far around a contact the picture must show the scene, r_G [m].
+        Radius around a contact within which the picture must show the scene, r_G [m].
 
     Returns
     -------
@@ -135,17 +135,35 @@ def visible_surface(view: CameraView, surfaces: Surfaces, radius_m: float) -> Vi
     return VisibleSurface(points, normals, hits.body[seen], origin, whole)
 
 
-def with_clouds(
+def add_clouds(
     kept: KeptGrasps,
     picture: Picture,
     pictures: list[Picture],
     config: RunConfig,
     rng: np.random.Generator,
 ) -> LabelledGrasps:
-    """Kept grasps with the clouds around them; see `clouds_around`. No object has an index yet."""
+    """Put the kept grasps and the clouds around them into one record.
+
+    Parameters
+    ----------
+    kept
+        Grasps proposed from one view.
+    picture
+        Measured picture of that view.
+    pictures
+        Measured pictures of all views.
+    config
+        Sections sensing, grasps and gripper.
+    rng
+        Draws which clouds are cut from all pictures.
+
+    Returns
+    -------
+    The grasps; ``object_index`` is still 0 everywhere.
+    """
     candidates, labels = kept.candidates, kept.labels
     frames = candidates.world_from_contact
-    cloud, mask, pictures_of_cloud = clouds_around(frames, picture, pictures, config, rng)
+    cloud, mask, pictures_of_cloud = cut_clouds(frames, picture, pictures, config, rng)
     first_touch = frames.copy()
     first_touch[:, :3, 3] += labels.touch_height_m[:, None] * first_touch[:, :3, 2]
     return LabelledGrasps(
@@ -170,8 +188,8 @@ def with_clouds(
     )
 
 
-def origin_of(scene: ClutterScene, viewpoint: str, names: tuple[str, ...]) -> GraspOrigin:
-    """What the grasps of one viewpoint have in common; ``names`` of the scene's objects."""
+def grasp_origin(scene: ClutterScene, viewpoint: str, names: tuple[str, ...]) -> GraspOrigin:
+    """Scene, viewpoint and names for a batch of grasps; ``names`` are the scene's objects."""
     return GraspOrigin(
         scene_id=scene.scene_id,
         viewpoint=viewpoint,

@@ -1,4 +1,4 @@
-"""Pads of some labelled grasps, draped again, for a recording to show."""
+"""The draped pads of some labelled grasps, computed again for a recording."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -20,16 +20,16 @@ SHOWN_SCENES = 4
 
 @dataclass(frozen=True)
 class ShownPads:
-    """Pads of some grasps of a shard, draped.
+    """Draped pads of some grasps of a shard.
 
     Attributes
     ----------
     grasp
-        Number of each grasp within its shard.
+        Number of each grasp within its shard, shape (k,).
     height_m
-        z(v) of S-1.07, in GCS.
+        z(v) of S-1.07, in GCS [m], shape (k, v).
     pressure
-        p w_j of each triangle, 0 where it is not in contact.
+        p w_j of each triangle [1], shape (k, t); 0 where it is not in contact.
     """
 
     grasp: Integer[np.ndarray, " k"]
@@ -43,7 +43,7 @@ def drape_again(
     surfaces: Surfaces,
     config: RunConfig,
 ) -> ShownPads:
-    """The pads of chosen grasps of one scene, as they lay when they were labelled.
+    """Drape the pads of chosen grasps of one scene again, as when they were labelled.
 
     Parameters
     ----------

@@ -15,16 +15,33 @@ from pipeline.config.cameras import (
     WristCameraConfig,
 )
 from pipeline.geometry.transforms import invert, look_at, rotate_vectors, transform_points
+from pipeline.read_only import read_only
 
-_TARGET_M = np.array([0.0, 0.0, 0.02])  # the middle of the table, a little above it
+_TARGET_M = np.array([0.0, 0.0, 0.02])  # a little above the middle of the table
 
 
 @dataclass(frozen=True, eq=False)
 class PinholeCamera:
     """A camera C with its pose P_C (S-1.13).
 
-    intrinsics : (3, 3) pixels. world_from_camera : (4, 4) pose of CCS in WCS.
-    sensor : how it errs. near_m, far_m : the depths it can measure.
+    Attributes
+    ----------
+    name
+        Name of the viewpoint.
+    width_px
+        Width of its pictures.
+    height_px
+        Height of its pictures.
+    intrinsics
+        Camera matrix in pixels, shape (3, 3).
+    world_from_camera
+        Pose of CCS in WCS, shape (4, 4).
+    sensor
+        Kind of depth sensor, which decides its noise.
+    near_m
+        Smallest depth that it measures [m].
+    far_m
+        Largest depth that it measures [m].
     """
 
     name: str
@@ -36,25 +53,40 @@ class PinholeCamera:
     near_m: float
     far_m: float
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "intrinsics", read_only(self.intrinsics))
+        object.__setattr__(self, "world_from_camera", read_only(self.world_from_camera))
+
 
 def scene_cameras(
     config: CamerasConfig, objects_m: Float[np.ndarray, "n 3"], rng: np.random.Generator
 ) -> tuple[PinholeCamera, ...]:
-    """Every viewpoint of a scene: the static ones, then the wrist's above objects of it.
+    """All cameras of a scene (S-1.13): the static ones, then those of the wrist above its objects.
 
-    objects_m : centres of the scene's objects in WCS.
+    Parameters
+    ----------
+    config
+        Static and wrist cameras.
+    objects_m
+        Centres of the scene's objects in WCS [m], shape (n, 3).
+    rng
+        Draws the wrist's viewpoints.
+
+    Returns
+    -------
+    Cameras with their poses.
     """
     return (*static_cameras(config.static), *wrist_cameras(config.wrist, objects_m, rng))
 
 
 def camera_names(config: CamerasConfig) -> list[str]:
-    """Names of a scene's viewpoints, in their order."""
+    """Names of the cameras that `scene_cameras` returns, in the same order."""
     static = [f"static_{number}" for number in range(len(config.static.elevations_rad))]
     return static + [f"wrist_{number}" for number in range(config.wrist.viewpoints)]
 
 
 def static_cameras(config: StaticCameraConfig) -> tuple[PinholeCamera, ...]:
-    """One camera a viewpoint, each looking at the middle of the table."""
+    """The cameras beside the table; each looks at the middle of the table."""
     places = zip(config.elevations_rad, config.azimuths_rad, strict=True)
     return tuple(
         camera_at(f"static_{number}", config, _TARGET_M, config.distance_m, elevation, azimuth)
@@ -65,7 +97,23 @@ def static_cameras(config: StaticCameraConfig) -> tuple[PinholeCamera, ...]:
 def wrist_cameras(
     config: WristCameraConfig, objects_m: Float[np.ndarray, "n 3"], rng: np.random.Generator
 ) -> tuple[PinholeCamera, ...]:
-    """The wrist's viewpoints: each above another object while there are some, from any side."""
+    """Viewpoints of the wrist camera, each looking at one object from a random side.
+
+    No object is looked at twice before every object was looked at once.
+
+    Parameters
+    ----------
+    config
+        Number of viewpoints, distance, and range of elevations.
+    objects_m
+        Centres of the scene's objects in WCS [m], shape (n, 3).
+    rng
+        Draws objects, elevations and azimuths.
+
+    Returns
+    -------
+    Cameras with their poses; none where there are no objects.
+    """
     if config.viewpoints == 0 or len(objects_m) == 0:
         return ()
     rounds = -(-config.viewpoints // len(objects_m))
@@ -93,7 +141,27 @@ def camera_at(
     elevation_rad: float,
     azimuth_rad: float,
 ) -> PinholeCamera:
-    """A camera that looks at a point in WCS from a distance; elevation above the horizontal."""
+    """Place a camera so that it looks at a point.
+
+    Parameters
+    ----------
+    name
+        Name of the viewpoint.
+    config
+        Resolution, field of view and depth range.
+    target_m
+        The point in WCS [m], shape (3,).
+    distance_m
+        Distance of the camera from the point [m].
+    elevation_rad
+        Angle of the camera above the horizontal, seen from the point [rad].
+    azimuth_rad
+        Angle of the camera about the vertical, from x of WCS [rad].
+
+    Returns
+    -------
+    The camera with its pose.
+    """
     focal_px = config.height_px / 2 / math.tan(config.vertical_fov_rad / 2)
     intrinsics = np.array(
         [
@@ -124,9 +192,9 @@ def camera_at(
 def pixel_slopes(
     intrinsics: Float[np.ndarray, "3 3"], shape: tuple[int, int]
 ) -> tuple[Float[np.ndarray, " w"], Float[np.ndarray, " h"]]:
-    """x of each column's and y of each row's pixel centres at depth 1 in CCS.
+    """x of the pixel centres of each column, and y of those of each row, at depth 1 in CCS.
 
-    Every point and every ray of a pixel is made from these.
+    All points and rays of pixels are computed from these.
 
     Parameters
     ----------
@@ -149,7 +217,7 @@ def pixel_slopes(
 def project_local(
     intrinsics: Float[np.ndarray, "3 3"], points_in_camera_m: Float[np.ndarray, "*n 3"]
 ) -> Float[np.ndarray, "*n 2"]:
-    """Column and row, in pixels, at which points of CCS are seen; pixel centres lie at +0.5.
+    """Project points of CCS to column and row in pixels; pixel centres lie at +0.5.
 
     Parameters
     ----------
@@ -160,7 +228,7 @@ def project_local(
 
     Returns
     -------
-    Shape (..., 2); NaN for what lies behind the camera or beside it.
+    Column and row, shape (..., 2); NaN for points with z <= 0.
     """
     z = points_in_camera_m[..., 2:]
     ahead = np.where(z > 0.0, z, np.nan)
@@ -171,7 +239,7 @@ def project_local(
 def project(
     camera: PinholeCamera, points_m: Float[np.ndarray, "*n 3"]
 ) -> tuple[Float[np.ndarray, "*n 2"], Float[np.ndarray, "*n"]]:
-    """Where a camera sees points of WCS.
+    """Project points of WCS into a camera's picture.
 
     Parameters
     ----------
@@ -190,7 +258,7 @@ def project(
 
 
 def in_picture(camera: PinholeCamera, pixels: Float[np.ndarray, "*n 2"]) -> Bool[np.ndarray, "*n"]:
-    """Whether columns and rows, as `project` gives them, lie within the picture; not where NaN."""
+    """Whether columns and rows of `project` lie within the picture; False where they are NaN."""
     return np.asarray(
         ((pixels >= 0.0) & (pixels < [camera.width_px, camera.height_px])).all(axis=-1)
     )
@@ -210,8 +278,18 @@ def pixel_rays(
 def picture_rays(camera: PinholeCamera) -> Float[np.ndarray, "n 3"]:
     """Unit rays through all pixels of a picture, as `pixel_rays` gives them, compiled.
 
-    Ten times as fast (2.4 ms for 27 ms at 640 x 480): the closed loop looks at every step. The
-    last bits differ, and published labels keep those of `pixel_rays`.
+    The closed loop takes a picture at every step, and this function needs 2.4 ms at 640 x 480 where
+    `pixel_rays` needs 27 ms. The last bits of the results differ, so labels use `pixel_rays` only:
+    published labels then stay the same.
+
+    Parameters
+    ----------
+    camera
+        The camera.
+
+    Returns
+    -------
+    Unit rays in WCS, row by row, shape (n, 3).
     """
     shape = (camera.height_px, camera.width_px)
     x, y = pixel_slopes(camera.intrinsics, shape)
@@ -239,19 +317,19 @@ def points_of_depth(
     every: int,
     above_m: float = -np.inf,
 ) -> tuple[Float[np.ndarray, "n 3"], Int[np.ndarray, " n"], Int[np.ndarray, " n"]]:
-    """Unproject a depth image: its measured points in WCS, row by row.
+    """Unproject a depth image into points of WCS, row by row.
 
     Parameters
     ----------
     depth_m
-        Depth along the camera's z [m], shape (h, w); what is not above zero and finite was not
-        measured.
+        Depth along the camera's z [m], shape (h, w). Pixels that are not finite or not above zero
+        were not measured and give no point.
     camera
-        What took it.
+        The camera that took the image.
     every
-        Of how many pixels a side one is taken.
+        Step between the rows and between the columns that are used.
     above_m
-        Points no higher than this in WCS are left out [m].
+        Height in WCS [m]; only points above it are kept.
 
     Returns
     -------
@@ -295,9 +373,20 @@ def _unprojected(
 
 
 def thinned(camera: PinholeCamera, every: int) -> PinholeCamera:
-    """The camera of a picture of which one of ``every`` pixels a side was kept, the first first.
+    """The camera of a picture of which only some rows and columns were kept, the first included.
 
-    A kept pixel's centre stays on its ray: it lies at +0.5 of the small picture as of the large.
+    The centre of a kept pixel is at +0.5 in the small picture too and has the same ray.
+
+    Parameters
+    ----------
+    camera
+        Camera of the whole picture.
+    every
+        Step between kept rows and columns.
+
+    Returns
+    -------
+    Camera of the small picture.
     """
     intrinsics = camera.intrinsics.copy()
     intrinsics[:2, :2] /= every
@@ -313,10 +402,23 @@ def thinned(camera: PinholeCamera, every: int) -> PinholeCamera:
 def shown_whole(
     camera: PinholeCamera, points_m: Float[np.ndarray, "n 3"], radius_m: float
 ) -> Bool[np.ndarray, " n"]:
-    """Whether the picture does not end within ``radius_m`` of each point in WCS.
+    """Whether a sphere around each point lies completely within the camera's field of view.
 
-    What a picture can show is a pyramid: a ball lies in it where its centre is at least its
-    radius inside each of the four faces.
+    The field of view is a pyramid. A sphere lies in it where its centre is at least the radius
+    inside each of the four faces.
+
+    Parameters
+    ----------
+    camera
+        The camera.
+    points_m
+        Centres of the spheres in WCS [m], shape (n, 3).
+    radius_m
+        Radius of the spheres [m].
+
+    Returns
+    -------
+    Shape (n,).
     """
     k = camera.intrinsics
     left, top = k[0, 2] / k[0, 0], k[1, 2] / k[1, 1]

@@ -1,7 +1,8 @@
 """First hits of rays with rigid bodies that move, and with the table.
 
-Each body keeps its own `RayScene` in its own frame, made once: moving one costs nothing, where
-a scene in the world's frame would be built anew. Rays are sorted out by bounding spheres first.
+Each body has a `RayScene` in its own frame that is built once. Rays are transformed into that
+frame, so a moved body needs no new scene. Rays that miss the bounding sphere of a body are not cast
+at it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -43,7 +44,7 @@ def bodies_at_rest(
 
 
 def surfaces_at_rest(bodies: Mapping[int, Mesh]) -> RayScene:
-    """Bodies that stay where they are, ready for rays; hits name them by their ids."""
+    """Surfaces of bodies that do not move, for ray casting; hits name them by their ids."""
     return RayScene(list(bodies.values()), list(bodies))
 
 
@@ -55,12 +56,12 @@ class PosedBodies:
         self._half_m = table_side_m / 2
 
     def at(self, poses: Mapping[int, Float[np.ndarray, "4 4"]]) -> "PosedScene":
-        """The bodies that have a pose, there."""
+        """The bodies for which a pose is given, at their poses; others are left out."""
         return PosedScene({i: (self._meshes[i], pose) for i, pose in poses.items()}, self._half_m)
 
 
 class PosedScene:
-    """Bodies where they are: `cast` and `normals_at` as those of `RayScene`, by body id."""
+    """Bodies at their poses, with `cast` and `normals_at` as in `RayScene`; hits hold body ids."""
 
     def __init__(
         self, bodies: Mapping[int, tuple[Mesh, Float[np.ndarray, "4 4"]]], table_half_m: float
@@ -76,14 +77,14 @@ class PosedScene:
         Parameters
         ----------
         origins_m
-            Where rays begin in WCS, shape (n, 3) [m].
+            Origins of the rays in WCS [m], shape (n, 3).
         directions
             Unit directions in WCS, shape (n, 3).
 
         Returns
         -------
-        Hits with the body's id, 0 for the table, -1 for nothing; the table has no triangles, its
-        ``triangle`` is -1.
+        Hits with the body's id, 0 for the table, -1 for nothing. The ``triangle`` is -1 for the
+        table, which has none.
         """
         origins = np.ascontiguousarray(origins_m, dtype=np.float64)
         rays = np.ascontiguousarray(directions, dtype=np.float64)
@@ -115,7 +116,7 @@ class PosedScene:
 
 @lru_cache(maxsize=512)
 def _own_scene(mesh: Mesh) -> tuple[RayScene, Float[np.ndarray, " 3"], float]:
-    """The mesh's rays in its own frame, and a sphere around it."""
+    """Ray scene of a mesh in its own frame, and centre and radius of a sphere around it [m]."""
     centre = (mesh.vertices_m.min(axis=0) + mesh.vertices_m.max(axis=0)) / 2
     radius = float(np.linalg.norm(mesh.vertices_m - centre, axis=1).max())
     return RayScene([mesh]), centre, radius * (1 + 1e-6)
@@ -146,7 +147,7 @@ def _meeting(
     centre: Float[np.ndarray, " 3"],
     radius: float,
 ) -> Int[np.ndarray, " k"]:
-    """Rays that pass through a sphere, or start in it."""
+    """Indices of the rays that pass through a sphere or start in it."""
     found = np.empty(len(origins), dtype=np.int64)
     count = 0
     for i in range(len(origins)):
@@ -170,7 +171,7 @@ def _in_frame(
     rays: Float[np.ndarray, "n 3"],
     chosen: Int[np.ndarray, " k"],
 ) -> tuple[Float[np.ndarray, "k 3"], Float[np.ndarray, "k 3"]]:
-    """The chosen rays seen from another frame."""
+    """Origins and directions of the chosen rays in another frame."""
     moved, turned = np.empty((len(chosen), 3)), np.empty((len(chosen), 3))
     t = frame_from_world
     for row in range(len(chosen)):
@@ -195,7 +196,7 @@ def _take_nearer(
     body: Int[np.ndarray, " n"],
     triangle: Int[np.ndarray, " n"],
 ) -> None:
-    """Keep a body's hits where they are nearer than what is known."""
+    """Store a body's hits where they are nearer than the hits stored so far."""
     for k in range(len(rows)):
         i = rows[k]
         if hit_m[k] < distance[i]:
@@ -208,7 +209,10 @@ def _take_nearer(
 def _turned(
     pose: Float[np.ndarray, "4 4"], vectors: Float[np.ndarray, "k 3"]
 ) -> Float[np.ndarray, "k 3"]:
-    """`transforms.rotate_vectors`, whose last bits depend on how many vectors it is given."""
+    """Rotate vectors by a pose, one by one.
+
+    The last bits of `transforms.rotate_vectors` depend on the number of vectors; these do not.
+    """
     turned = np.empty_like(vectors)
     for k in range(len(vectors)):
         for axis in range(3):

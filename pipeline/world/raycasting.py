@@ -12,28 +12,36 @@ from jaxtyping import Bool, Float, Int
 
 from pipeline.geometry.mesh import Mesh
 
-# Embree works in float32: the scene is brought to the origin and to this size, so that neither
-# far-off scenes nor very small triangles lose digits.
+# Embree works in float32. The scene is moved to the origin and scaled to this size, so that neither
+# a scene far from its origin nor very small triangles lose digits.
 _EMBREE_EXTENT = 100.0
-# Aside by this share of the scene, a ray that slipped through an edge is cast again.
+# A ray that passed through an edge is cast again, moved sideways by this share of the scene.
 _ASIDE = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
 class RayHits:
-    """First hit of each ray; arrays of one length n."""
+    """First hit of each ray; arrays of one length n.
+
+    Attributes
+    ----------
+    distance_m
+        Distance from the ray's origin along its direction [m], shape (n,); inf where nothing is
+        hit.
+    body
+        Number of the body hit, shape (n,): its index in the scene, or its id where the scene has
+        ids; -1 where nothing is hit.
+    triangle
+        Index of the face within that body's mesh, shape (n,); -1 where nothing is hit.
+    """
 
     distance_m: Float[np.ndarray, " n"]
-    """From the ray's origin along its direction [m]; inf where nothing is hit."""
     body: Int[np.ndarray, " n"]
-    """Number of the body hit: its index in the scene, or its id where the scene has ids; -1 where
-    nothing is hit."""
     triangle: Int[np.ndarray, " n"]
-    """Index of the face within that body's mesh; -1 where nothing is hit."""
 
 
 class Surfaces(Protocol):
-    """Bodies' surfaces that rays can be cast at: at rest (`RayScene`) or posed anew
+    """Surfaces of bodies at which rays can be cast: fixed (`RayScene`), or at poses that change
     (`posed_bodies.PosedScene`)."""
 
     def cast(
@@ -57,12 +65,12 @@ class RayScene:
     bodies
         Meshes in the scene's frame, usually the world.
     body_ids
-        By what number `RayHits` names each body: distinct, not negative. Left out, its index.
+        Number by which `RayHits` names each body, distinct and not negative; by default its index.
 
     Raises
     ------
     ValueError
-        There is not one triangle, or the ids do not fit the bodies.
+        The bodies have no triangle, or the ids are not one for each body, distinct and from 0.
     """
 
     def __init__(self, bodies: Sequence[Mesh], body_ids: Sequence[int] | None = None) -> None:
@@ -132,11 +140,25 @@ class RayScene:
         origins_m: Float[np.ndarray, "n 3"],
         directions: Float[np.ndarray, "n 3"] | Float[np.ndarray, " 3"],
     ) -> RayHits:
-        """First hit of each ray, on either side of a triangle.
+        """Find the first hit of each ray; triangles are hit from both sides.
 
-        origins_m: (n, 3) in the scene's frame; directions: (n, 3), of any length above zero, or
-        (3,) for parallel rays. Distances are exact to float64: only the choice of the triangle is
-        Embree's. Raises ValueError for arrays of other shapes or not finite.
+        Embree only chooses the triangle; the distance to it is computed in float64.
+
+        Parameters
+        ----------
+        origins_m
+            Origins of the rays in the scene's frame [m], shape (n, 3).
+        directions
+            Directions of any length above zero, shape (n, 3), or (3,) for parallel rays.
+
+        Returns
+        -------
+        The hits.
+
+        Raises
+        ------
+        ValueError
+            An array has another shape or is not finite, or a direction has length zero.
         """
         origins = np.ascontiguousarray(origins_m, dtype=np.float64)
         if origins.ndim != 2 or origins.shape[1] != 3:
@@ -153,8 +175,9 @@ class RayScene:
             return RayHits(np.empty(0), nothing, nothing)
         face = self._first_faces(origins, rays)
         distance, from_inside = _plane_distances(self._corners, face, origins, rays)
-        # One ray in a thousand that is aimed exactly at an edge slips through it and hits the far
-        # wall from inside. Rays that start inside a body come here too and stay as they are.
+        # About one in a thousand of the rays aimed exactly at an edge passes through it and hits
+        # the far wall from inside. Rays that start inside a body are cast again too, and keep
+        # their hit.
         again = np.flatnonzero(from_inside)
         if len(again):
             aside = np.array([0.6, -0.48, 0.64]) * (_ASIDE * _EMBREE_EXTENT / self._scale)
@@ -172,7 +195,7 @@ class RayScene:
         self, origins: Float[np.ndarray, "n 3"], rays: Float[np.ndarray, "n 3"]
     ) -> Int[np.ndarray, " n"]:
         """Face each unit ray hits first, bodies one after the other; -1 for none."""
-        # Without `output`, Embree returns the triangle alone; twice as fast as with.
+        # Without `output`, Embree returns only the triangle, which is twice as fast.
         face = self._embree.run(
             ((origins - self._centre) * self._scale).astype(np.float32), rays.astype(np.float32)
         )
@@ -189,8 +212,9 @@ def _plane_distances(
     """Distance along unit rays to the plane of the given face, inf where face is -1; and whether
     the face is seen from behind.
 
-    Kept within the range of the face's corners along the ray: near an edge of a face almost
-    parallel to the ray, the float32 hit may lie a hair beside it and its plane far away.
+    The distance is limited to the range of the face's corners along the ray. Where a face is almost
+    parallel to the ray, the float32 hit may lie slightly outside the face, and the ray then meets
+    its plane far away.
     """
     distance = np.full(len(face), np.inf)
     from_inside = np.zeros(len(face), dtype=np.bool_)

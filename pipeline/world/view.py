@@ -1,4 +1,4 @@
-"""What a camera saw, as arrays."""
+"""A camera's picture of a scene, as arrays."""
 
 from dataclasses import dataclass
 
@@ -11,14 +11,24 @@ from pipeline.world.cameras import PinholeCamera
 
 @dataclass(frozen=True, eq=False)
 class CameraView:
-    """One exact picture of a scene, before its sensor disturbs it.
+    """One exact picture of a scene, without the noise of the sensor.
 
-    depth_m : (h, w) along the camera's z, 0 where nothing was seen.
-    segmentation : (h, w) body id, 0 for the table and the background.
-    normals : (h, w, 3) unit shading normals in CCS as a normal map, 128 + 127 n; 0 where
-        nothing was seen.
-    behind_m : depth of what lies behind transparent objects, taken with these away; None where
-        the scene has none.
+    Attributes
+    ----------
+    camera
+        The camera that took it.
+    depth_m
+        Depth along the camera's z [m], shape (h, w); 0 where nothing was seen.
+    colour
+        Red, green and blue, shape (h, w, 3).
+    segmentation
+        Body id, shape (h, w); 0 for the table and the background.
+    normals
+        Unit shading normals in CCS as a normal map, 128 + 127 n, shape (h, w, 3); 0 where nothing
+        was seen.
+    behind_m
+        Depth of the scene without its transparent objects [m], shape (h, w); None where it has
+        none.
     """
 
     camera: PinholeCamera
@@ -30,7 +40,7 @@ class CameraView:
 
 
 def normal_map(normals: Float[np.ndarray, "h w 3"]) -> UInt8[np.ndarray, "h w 3"]:
-    """Unit normals in CCS as 128 + 127 n; where a normal is zero or not finite, 0."""
+    """Encode unit normals in CCS as 128 + 127 n; 0 where a normal is zero or not finite."""
     return np.asarray(_normal_map(normals))
 
 
@@ -42,7 +52,7 @@ def _normal_map(normals: Float[np.ndarray, "h w 3"]) -> UInt8[np.ndarray, "h w 3
             x, y, z = normals[i, j]
             largest = max(abs(x), abs(y), abs(z))
             if np.isfinite(x + y + z) and largest > 0.0:
-                # From 1 to 255, so that no direction reads as nothing seen.
+                # Values are 1 to 255, because 0 means that nothing was seen.
                 for k in range(3):
                     scaled = 127.0 * min(max(normals[i, j, k], -1.0), 1.0)
                     encoded[i, j, k] = 128 + int(np.floor(scaled + 0.5))
@@ -50,7 +60,7 @@ def _normal_map(normals: Float[np.ndarray, "h w 3"]) -> UInt8[np.ndarray, "h w 3
 
 
 def normals_of(view: CameraView) -> Float[np.ndarray, "h w 3"]:
-    """Unit normals in CCS, good to half a degree; NaN where nothing was seen."""
+    """Decode unit normals in CCS, exact to half a degree; NaN where nothing was seen."""
     normals = (view.normals.astype(np.float64) - 128) / 127
     normals[(view.normals == 0).all(axis=2)] = np.nan
     return np.asarray(normals / np.linalg.norm(normals, axis=2, keepdims=True))

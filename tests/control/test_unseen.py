@@ -143,7 +143,7 @@ def test_it_feels_its_way_down_to_what_it_cannot_measure(several_views: bool) ->
     np.testing.assert_allclose(decision.world_from_contact[:2, 3], MIDDLE_M, atol=SIDE_M / 2)
 
 
-def test_a_place_that_failed_is_felt_for_last() -> None:
+def test_a_place_that_failed_is_aim_unmeasured_last() -> None:
     robot = FakeRobot(TOP_M)
     eyes = TwoGlasses(np.empty((0, 3)), robot)
     strategy = Strategy("open-loop", unused, False, False, False, False)

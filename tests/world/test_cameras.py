@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -105,3 +106,10 @@ def test_a_thinned_picture_shows_the_same_points(seed: int, every: int) -> None:
     expected, _, _ = points_of_depth(depth, camera, every)
     points, _, _ = points_of_depth(depth[::every, ::every], small, every=1)
     np.testing.assert_allclose(points, expected, atol=1e-12)
+
+
+def test_pose_and_intrinsics_cannot_be_written_to() -> None:
+    camera = some_camera(np.random.default_rng(0))
+    for array in (camera.intrinsics, camera.world_from_camera):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0, 0] = 2.0
