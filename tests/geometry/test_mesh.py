@@ -29,4 +29,5 @@ def test_a_mesh_is_scaled_about_its_origin_and_moved_by_a_pose() -> None:
     np.testing.assert_allclose(mesh.scaled(2.0).extents_m, [0.6, 0.4, 0.2])
     quarter_turn = np.array([[0, -1, 0, 1.0], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]])
     moved = mesh.transformed(quarter_turn).vertices_m
-    np.testing.assert_allclose(moved, [[1, 2, 3], [1, 2.3, 3], [0.8, 2, 3], [1, 2, 3.1]])
+    expected = np.array([[1.0, 2.0, 3.0], [1.0, 2.3, 3.0], [0.8, 2.0, 3.0], [1.0, 2.0, 3.1]])
+    np.testing.assert_allclose(moved, expected)

@@ -91,7 +91,7 @@ def test_eq_4_f_y(mu: float, f_y: float) -> None:
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.5, 1.0])
-def test_eq_5_f_z_knows_no_friction(mu: float) -> None:
+def test_eq_5_f_z_does_not_depend_on_friction(mu: float) -> None:
     assert wrench_matrix(PAD, SLANTED, mu)[2, 0] == pytest.approx(0.04, rel=1e-12)
 
 
