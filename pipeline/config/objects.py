@@ -38,7 +38,7 @@ class ObjectsConfig(ScaledSection):
     copies: Literal["one", "all"] = Field(
         "one", description="files of one surface: one object, or all objects of one family"
     )
-    # Measured on 47 scans: simplified to a quarter of their faces and turned, all but six noisy or
+    # Measured on 47 scans: simplified to a quarter of their faces and turned, all but five noisy or
     # thin ones stay under it; the most alike of different ones (screwdrivers) are 0.0041 apart.
     copies_rms: float = Field(
         2e-3, ge=0, le=0.1, description="surfaces nearer than this are one, rms over sqrt(A) [1]"

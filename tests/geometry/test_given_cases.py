@@ -18,6 +18,7 @@ from pipeline.errors import MeshError
 from pipeline.geometry.catalogue import measure_object
 from pipeline.geometry.shape import surface_area, volume
 from pipeline.geometry.urdf_files import load_object_file
+from tests.geometry.corpus.folder_cases import plan_of
 
 NAMED = os.environ.get("CASES_DIR", "")
 RELATIVE = 1e-5  # files hold nine digits, or a float32
@@ -43,7 +44,7 @@ def test_every_file_is_read_right_or_refused(
     for name, right in answers.items():
         path = folder / name
         if not path.is_file():
-            continue  # a folder of copies: a matter of the catalogue
+            continue  # a folder of copies: below
         try:
             item = measure_object(load_object_file(path, folder, "o", config), config)
         except MeshError as error:
@@ -62,3 +63,16 @@ def test_every_file_is_read_right_or_refused(
             if not np.allclose(found[key], right[key], rtol=RELATIVE):
                 wrong[name] = f"{key} is {found[key]}, and {right[key]} is right"
     assert wrong == {}
+
+
+def test_a_folder_of_copies_is_as_many_objects_as_it_holds(
+    written: tuple[Path, dict[str, dict[str, Any]]],
+) -> None:
+    folder, answers = written
+    held = {name: right["objects"] for name, right in answers.items() if "objects" in right}
+    assert held
+    for name, objects in held.items():
+        plan = plan_of(folder / name)
+        assert len(plan.taken) == objects
+        files = {item.source.label for item in plan.taken}.union(*plan.copies.values())
+        assert len(files) == sum(path.is_file() for path in (folder / name).rglob("*"))

@@ -9,6 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.config import ObjectsConfig, SplitConfig
+from pipeline.geometry.catalogue import measure_object
+from pipeline.geometry.mesh_folders import list_mesh_files
+from pipeline.geometry.plan import Plan, plan_catalogue
+from pipeline.geometry.settled import Settled
+from pipeline.geometry.urdf_files import load_object_file, standalone
 from tests.geometry.corpus.dialects import obj, ply, stl
 from tests.geometry.corpus.solids import BOX, NOTCHED, Solid, box, in_triangles
 
@@ -53,6 +59,16 @@ def write_folder(case: FolderCase, place: Path) -> Path:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(data)
     return place / case.name
+
+
+def plan_of(folder: Path) -> Plan:
+    """What a run at first sight of a folder makes of it, with sizes as they are."""
+    config = ObjectsConfig(rescaled=False)
+    items = [
+        measure_object(load_object_file(path, folder, path.name, config), config)
+        for path in standalone(list_mesh_files(folder), folder)
+    ]
+    return plan_catalogue(items, frozenset(), (), (config, SplitConfig()), 0, Settled("first"))
 
 
 def folder_cases() -> Iterator[FolderCase]:

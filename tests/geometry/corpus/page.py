@@ -3,17 +3,20 @@
 import tempfile
 from pathlib import Path
 
-from pipeline.config import ObjectsConfig, SplitConfig
+from pipeline.config import ObjectsConfig
 from pipeline.errors import MeshError
 from pipeline.geometry.catalogue import measure_object
-from pipeline.geometry.mesh_folders import list_mesh_files
-from pipeline.geometry.plan import plan_catalogue
-from pipeline.geometry.settled import Settled
 from pipeline.geometry.shape import outer_surface, surface_area, volume
-from pipeline.geometry.urdf_files import load_object_file, standalone
+from pipeline.geometry.urdf_files import load_object_file
 from tests.geometry.corpus import corpus
 from tests.geometry.corpus.case import Case, write
-from tests.geometry.corpus.folder_cases import FolderCase, Known, folder_cases, write_folder
+from tests.geometry.corpus.folder_cases import (
+    FolderCase,
+    Known,
+    folder_cases,
+    plan_of,
+    write_folder,
+)
 
 PAGE = Path(__file__).with_name("README.md")
 _HEAD = """# Mesh files that people bring
@@ -78,12 +81,7 @@ def _objects(case: FolderCase, place: Path) -> list[str]:
 
 def objects_of(case: FolderCase, place: Path) -> dict[str, Known]:
     """What a run makes of a folder."""
-    config, folder = ObjectsConfig(rescaled=False), write_folder(case, place)
-    items = [
-        measure_object(load_object_file(path, folder, path.name, config), config)
-        for path in standalone(list_mesh_files(folder), folder)
-    ]
-    plan = plan_catalogue(items, frozenset(), (), (config, SplitConfig()), 0, Settled("page"))
+    plan = plan_of(write_folder(case, place))
     assert not plan.left_out, case.name
     return {
         item.source.name: Known(
