@@ -4,9 +4,9 @@ import json
 import sys
 from pathlib import Path
 
-from tests.geometry.corpus import corpus_cases
+from tests.geometry.corpus import corpus_cases, folders
 from tests.geometry.corpus.case import Case, write
-from tests.geometry.corpus.folder_cases import folder_cases, write_folder
+from tests.geometry.corpus.folder_cases import write_folder
 from tests.geometry.corpus.page import PAGE, page
 
 
@@ -35,7 +35,7 @@ def main(where: str) -> None:
     for case in corpus_cases():
         write(case, folder)
         answers[case.name] = answer(case)
-    for folder_case in folder_cases():
+    for folder_case in folders():
         write_folder(folder_case, folder)
         objects = {name: vars(known) for name, known in folder_case.objects.items()}
         answers[folder_case.name] = {"what": folder_case.what, "objects": objects}

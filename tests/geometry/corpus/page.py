@@ -1,22 +1,13 @@
-"""The table of the corpus: what each file is, and what reading it gives."""
+"""The page of the corpus: what each file is, and what reading it gives."""
 
-import tempfile
 from pathlib import Path
 
-from pipeline.config import ObjectsConfig
 from pipeline.errors import MeshError
-from pipeline.geometry.catalogue import measure_object
 from pipeline.geometry.shape import outer_surface, surface_area, volume
-from pipeline.geometry.urdf_files import load_object_file
-from tests.geometry.corpus import corpus
-from tests.geometry.corpus.case import Case, write
-from tests.geometry.corpus.folder_cases import (
-    FolderCase,
-    Known,
-    folder_cases,
-    plan_of,
-    write_folder,
-)
+from tests.geometry.corpus import corpus, folders
+from tests.geometry.corpus.case import Case
+from tests.geometry.corpus.folder_cases import FolderCase
+from tests.geometry.corpus.reading import objects_of, read
 
 PAGE = Path(__file__).with_name("README.md")
 _HEAD = """# Mesh files that people bring
@@ -50,28 +41,26 @@ their neighbours; mapbox-earcut leaves them out, and the neighbouring faces gape
 def page() -> str:
     """The whole page."""
     parts = [_HEAD]
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch).resolve()
-        for kind, cases in corpus().items():
-            good = [case for case in cases if case.solid is not None]
-            bad = [case for case in cases if case.solid is None]
-            parts.append(f"\n## {kind}: {len(good)} read, {len(bad)} refused\n")
-            parts.append("| file | what it is | V [cm³] | A [cm²] | NSVR | bodies | within |")
-            parts.append("|-|-|-|-|-|-|-|")
-            parts += [_read(case, folder) for case in good]
-            if bad:
-                parts.append("\n| file | what it is | why it is refused |\n|-|-|-|")
-                parts += [_refused(case, folder) for case in bad]
-        parts.append("\n## Folders: one object in several files, names, units\n")
-        parts.append("| folder | what it is | object | file | unit | copies left out |")
-        parts.append("|-|-|-|-|-|-|")
-        for folder_case in folder_cases():
-            parts += _objects(folder_case, folder)
+    for kind, cases in corpus().items():
+        good = [case for case in cases if case.solid is not None]
+        bad = [case for case in cases if case.solid is None]
+        parts.append(f"\n## {kind}: {len(good)} read, {len(bad)} refused\n")
+        parts.append("| file | what it is | V [cm³] | A [cm²] | NSVR | bodies | within |")
+        parts.append("|-|-|-|-|-|-|-|")
+        parts += [_read(case) for case in good]
+        if bad:
+            parts.append("\n| file | what it is | why it is refused |\n|-|-|-|")
+            parts += [_refused(case) for case in bad]
+    parts.append("\n## Folders: one object in several files, names, units\n")
+    parts.append("| folder | what it is | object | file | unit | copies left out |")
+    parts.append("|-|-|-|-|-|-|")
+    for folder in folders():
+        parts += _objects(folder)
     return "\n".join(parts) + "\n"
 
 
-def _objects(case: FolderCase, place: Path) -> list[str]:
-    assert objects_of(case, place) == case.objects, case.name
+def _objects(case: FolderCase) -> list[str]:
+    assert objects_of(case) == case.objects, case.name
     return [
         f"| `{case.name}` | {case.what} | `{name}` | `{known.source}` | {known.unit} "
         f"| {', '.join(f'`{path}`' for path in known.copies) or 'none'} |"
@@ -79,26 +68,13 @@ def _objects(case: FolderCase, place: Path) -> list[str]:
     ]
 
 
-def objects_of(case: FolderCase, place: Path) -> dict[str, Known]:
-    """What a run makes of a folder."""
-    plan = plan_of(write_folder(case, place))
-    assert not plan.left_out, case.name
-    return {
-        item.source.name: Known(
-            item.source.label, item.source.unit, plan.copies.get(item.source.name, ())
-        )
-        for item in plan.taken
-    }
-
-
-def _read(case: Case, folder: Path) -> str:
-    config = ObjectsConfig(rescaled=False)
-    source = load_object_file(write(case, folder), folder, "object", config)
-    mesh = measure_object(source, config).mesh
+def _read(case: Case) -> str:
+    item = read(case)
+    assert not isinstance(item, MeshError), item
     assert case.solid is not None
     worst = max(
-        abs(volume(mesh) / case.solid.volume_m3 - 1),
-        abs(surface_area(outer_surface(mesh)) / case.solid.area_m2 - 1),
+        abs(volume(item.mesh) / case.solid.volume_m3 - 1),
+        abs(surface_area(outer_surface(item.mesh)) / case.solid.area_m2 - 1),
     )
     assert worst <= case.tolerance, (case.name, worst)
     return (
@@ -108,11 +84,8 @@ def _read(case: Case, folder: Path) -> str:
     )
 
 
-def _refused(case: Case, folder: Path) -> str:
-    config = ObjectsConfig(rescaled=False)
-    try:
-        measure_object(load_object_file(write(case, folder), folder, "object", config), config)
-    except MeshError as error:
-        sentence = str(error).replace(str(folder), "FOLDER").replace("|", "\\|")
-        return f"| `{case.name}` | {case.what} | {sentence} |"
-    raise AssertionError(f"{case.name} was not refused")
+def _refused(case: Case) -> str:
+    error = read(case)
+    assert isinstance(error, MeshError), f"{case.name} was not refused"
+    sentence = str(error).replace("|", "\\|")
+    return f"| `{case.name}` | {case.what} | {sentence} |"
