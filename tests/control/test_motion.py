@@ -58,7 +58,7 @@ def test_nothing_seen_is_nothing_known() -> None:
     assert not motion.velocity_m_s.any()
 
 
-def test_an_even_surface_without_end_tells_nothing() -> None:
+def test_an_even_surface_without_edges_gives_no_velocity() -> None:
     rng = np.random.default_rng(3)
     motion = Motion(PERIOD_S, SEEN_M, MotionConfig())
     for _ in range(6):

@@ -172,7 +172,7 @@ def test_it_meets_an_object_that_passes(passes_m_s: float) -> None:
     assert np.linalg.norm(decision.world_from_contact[:2, 3] - middle) < 0.012
 
 
-def test_what_runs_away_is_not_chased_for_ever() -> None:
+def test_an_attempt_ends_where_the_object_keeps_moving_away() -> None:
     robot = FakeRobot(TOP_M)
     eyes = FakeEyes(plate()[::3], robot)
     step = robot.step

@@ -10,7 +10,7 @@ def test_wilson_interval_of_eight_in_ten() -> None:
     assert success_rate(8, 10) == pytest.approx((0.8, 0.490162, 0.943318), abs=1e-5)
 
 
-def test_no_attempt_says_nothing() -> None:
+def test_without_attempts_the_interval_is_all_of_0_to_1() -> None:
     assert success_rate(0, 0) == (0.0, 0.0, 1.0)
 
 
