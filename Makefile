@@ -29,7 +29,7 @@ ifeq (,$(strip $(WORKERS)))
 unexport WORKERS
 endif
 
-.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee holdout folds review report export predict real calibrate live docs lint fuzz regress clean FORCE
+.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee holdout folds release review report export predict real calibrate live docs lint fuzz regress clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -126,6 +126,9 @@ folds: .venv/.ready  ## cross-validation over families, FOLDS=k, to runs/<run>/f
 	  $(PY) -m stages.scenes --run $(RUN)/folds/fold-$$fold && \
 	  $(PY) -m stages.grasps --run $(RUN)/folds/fold-$$fold || exit 1; done
 	@FOLDS=$(FOLDS) $(PY) -m stages.folds measure
+
+release: .venv/.ready  ## RUN's network in the place of the released one, with baseline and figures
+	@RUN=$(RUN) $(PY) -m stages.release
 
 gallery: .venv/.ready  ## the nine levels on one sheet, to runs/<run>/gallery.png
 	@$(PY) -m stages.gallery

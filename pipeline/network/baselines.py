@@ -110,6 +110,13 @@ class MonotoneRegressor:
         quality: Float[np.ndarray, " n"] = np.interp(feature, self.feature, self.quality)
         return quality
 
+    def without_repeats(self) -> "MonotoneRegressor":
+        """The same function without knots inside its flat steps."""
+        inside = np.zeros(len(self.quality), dtype=bool)
+        same = self.quality[1:] == self.quality[:-1]
+        inside[1:-1] = same[:-1] & same[1:]
+        return MonotoneRegressor(self.feature[~inside], self.quality[~inside])
+
 
 def fit_monotone(
     feature: Float[np.ndarray, " n"], quality: Float[np.ndarray, " n"]

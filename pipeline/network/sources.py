@@ -91,11 +91,12 @@ def sha256_of(path: Path) -> str:
 
 def baseline_to_json(baseline: AnalyticBaseline) -> str:
     """What was chosen on training samples, without pad and physics."""
+    scale = baseline.scale.without_repeats()
     chosen = {
         "tolerance": baseline.tolerance,
         "smoothing": baseline.smoothing,
-        "label": baseline.scale.feature.tolist(),
-        "quality": baseline.scale.quality.tolist(),
+        "label": scale.feature.tolist(),
+        "quality": scale.quality.tolist(),
     }
     return json.dumps(chosen, indent=1) + "\n"
 

@@ -65,3 +65,12 @@ def test_the_weighted_mean_is_weighted_in_what_it_predicts_and_in_its_error() ->
     even = weighted_mean_predictor_mae(learned, np.ones(2), test, np.ones(2))
     assert even == pytest.approx(mean_predictor_mae(learned, test))
     assert weighted_mean_predictor_mae(learned, np.full(2, np.nan), test, np.ones(2)) is None
+
+
+def test_a_regressor_without_repeats_is_the_same_function() -> None:
+    feature = np.linspace(0, 1, 40)
+    fitted = fit_monotone(feature, np.floor(4 * feature) / 4)
+    short = fitted.without_repeats()
+    assert len(short.feature) < 12
+    at = np.linspace(-0.2, 1.2, 999)
+    np.testing.assert_array_equal(short.predict(at), fitted.predict(at))
