@@ -12,6 +12,7 @@ from pipeline.artifacts import package_version, publish_bytes
 from pipeline.config import load_run_config
 from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder, run_command
+from pipeline.reporting.agreement import as_markdown
 from pipeline.reporting.facts import read_catalogue, read_origins, read_success, read_summary
 from pipeline.reporting.failures import failures_of
 from pipeline.reporting.figures import figures_of, overall_rates
@@ -51,7 +52,8 @@ def make_report(folder: RunFolder) -> Path:
         )
     catalogue = read_catalogue(folder.artifact("objects"))
     success = read_success(folder.artifact("evaluate")) if summaries["evaluate"] else {}
-    figures = figures_of(folder, summaries, catalogue, success)
+    referee = read_summary(RunFolder(folder.path / "referee").summary("referee"))
+    figures = figures_of(folder, summaries, catalogue, success, referee)
     failures, pictures = (
         failures_of(folder, config, next(iter(success)), FAILURES) if success else ([], {})
     )
@@ -81,6 +83,7 @@ def make_report(folder: RunFolder) -> Path:
             "picture": lambda name: f"{FIGURES}/{name}",
             "not_yet": lambda what, goal: f"Not made yet: `make {goal} RUN={run}`.",
             "success": success,
+            "referee": as_markdown(referee) if referee else "",
             "overall": overall_rates(summaries["evaluate"]),
             "comparisons": (summaries["evaluate"] or {}).get("comparisons", {}),
             "failures": failures,

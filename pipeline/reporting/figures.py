@@ -14,6 +14,7 @@ def figures_of(
     summaries: Mapping[str, dict[str, Any] | None],
     catalogue: CatalogueFacts,
     success: dict[str, dict[int, LevelResult]],
+    referee: dict[str, Any] | None,
 ) -> dict[str, str]:
     """Name to SVG of every figure that the run has numbers for."""
     nsvr = {item.name: item.nsvr for item in catalogue.objects}
@@ -43,6 +44,8 @@ def figures_of(
         svg["fig-1"] = plots.fig_1(members, sweep["budget"]["mean_predictor_mae"])
     if success:
         svg["success"] = plots.success_by_level(rates(success))
+    if referee:
+        svg["load"] = plots.load_by_quality(referee["by_tenth"])
     svg["timings"] = plots.wall_times(
         {name: found["wall_time_s"] for name, found in summaries.items() if found}
     )

@@ -6,13 +6,17 @@ import shutil
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
 from pipeline.artifacts import ArtifactWriter, open_artifact
+from pipeline.config.agreement import AgreementConfig
 from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder
+from pipeline.referee import agreement
 from schemas.softgrip.v1.grasps_pb2 import ShardIndex
 from stages.report import make_report
 
@@ -131,6 +135,17 @@ def test_parts_of_different_states_are_told_apart(copied: RunFolder) -> None:
     shards.write_bytes(before)
 
 
+def borne() -> dict[str, Any]:
+    """Figures as `make referee` leaves them, of loads that grow with q."""
+    rng = np.random.default_rng(0)
+    quality, config = rng.random(60), AgreementConfig(resamples=5)
+    scores = {"q": quality, "q-hat": rng.random(60)}
+    found = {"borne_n": 5 * quality, "straight_n": 8 * quality}
+    figures = agreement.figures_of(scores, found, np.arange(60) % 4, np.ones(60), config, rng)
+    varied = agreement.varied(scores, found["borne_n"], {"friction x 2": 6 * quality}, config)
+    return {**figures, "varied": varied, "ms_a_grasp": 30.0}
+
+
 def test_a_sweep_and_baselines_are_shown(copied: RunFolder) -> None:
     network = {"group": "family", "test_mae": 0.2, "ms_a_grasp": 0.3, "layers": 18}
     sweep = {
@@ -157,12 +172,18 @@ def test_a_sweep_and_baselines_are_shown(copied: RunFolder) -> None:
         }
     }
     copied.summary("evaluate").write_text(json.dumps(evaluate))
+    judged = copied.path / "referee" / "referee.summary.json"
+    judged.parent.mkdir(exist_ok=True)
+    judged.write_text(json.dumps(borne()))
     make_report(copied)
     words = page_of(copied).words
     assert "3 networks on one budget of 10 grasps" in words
     assert "8-8-16-16" in (copied.path / "report" / "fig-1.svg").read_text()
     assert "top <down>" in words
     assert "0.125" in words
+    assert "AUROC, bears 2 N" in words
+    assert "friction x 2" in words
+    assert "q-hat" in (copied.path / "report" / "load.svg").read_text()
 
 
 def test_words_of_the_configuration_stay_words(copied: RunFolder) -> None:
