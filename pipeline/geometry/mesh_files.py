@@ -35,6 +35,8 @@ class MeshSource:
     unit_known_by: UnitSource
     notes: tuple[str, ...] = ()
     """What the object's record should say of how the file was read."""
+    left_off: tuple[str, ...] = ()
+    """Paths of further files of this object that it names and that are not read."""
 
     @property
     def extent(self) -> float:

@@ -128,7 +128,11 @@ def plan_catalogue(
     )
     now = settled.with_splits({measured[name].content: where for name, where in split.items()})
     now = now.with_splits(_shared_splits(contents, now.splits)).with_names(names)
-    listed = {names[label]: of for label, of in copies.items() if left_off}
+    listed = {
+        name: (*item.source.left_off, *(copies.get(item.source.label, ()) if left_off else ()))
+        for name, item in measured.items()
+    }
+    listed = {name: tuple(sorted(of)) for name, of in listed.items() if of}
     return Plan(measured, listed, split, families, unit, too_thin, now)
 
 

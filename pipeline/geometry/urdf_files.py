@@ -6,6 +6,7 @@ for beside the URDF and in its folder, never outside; URDF is in metres by its d
 
 import hashlib
 import re
+from contextlib import suppress
 from pathlib import Path
 from urllib.parse import unquote
 from xml.etree import ElementTree
@@ -88,7 +89,40 @@ def load_urdf_file(path: Path, folder: Path, name: str, config: ObjectsConfig) -
     )
     check_finite(label, merged.vertices_m)
     unit, known_by = length_unit(label, float(merged.extents_m.max()), "m", config)
-    return MeshSource(name, label, digest.hexdigest(), merged, unit, known_by, tuple(notes))
+    return MeshSource(
+        name,
+        label,
+        digest.hexdigest(),
+        merged,
+        unit,
+        known_by,
+        tuple(notes),
+        _left_off(root, path, folder),
+    )
+
+
+def _left_off(root: ElementTree.Element, urdf: Path, folder: Path) -> tuple[str, ...]:
+    """Collision meshes of links whose visual meshes are taken, by their paths in the folder."""
+    taken: set[Path] = set()
+    others: set[Path] = set()
+    for link in root.findall("link"):
+        seen, felt = (link.findall(f"{kind}/geometry/mesh") for kind in ("visual", "collision"))
+        if link.find("visual") is None:
+            taken |= _places(felt, urdf, folder)
+        else:
+            taken |= _places(seen, urdf, folder)
+            others |= _places(felt, urdf, folder)
+    paths = (path.relative_to(folder.resolve()).as_posix() for path in others - taken)
+    return tuple(sorted(paths))
+
+
+def _places(meshes: list[ElementTree.Element], urdf: Path, folder: Path) -> set[Path]:
+    """The files of those meshes that are there."""
+    found: set[Path] = set()
+    for mesh in meshes:
+        with suppress(MeshError):  # one that is not read may be missing
+            found.add(_resolved(mesh.get("filename", ""), urdf, folder))
+    return found
 
 
 def _root(path: Path, folder: Path) -> ElementTree.Element:

@@ -139,7 +139,7 @@ def _copies() -> Iterator[FolderCase]:
         "folder_urdf",
         "a URDF with a mesh to be seen and one to collide",
         {"r.urdf": link.encode(), "visual.obj": obj(NOTCHED), "collision.stl": _binary(BOX)},
-        {"r": Known("r.urdf")},
+        {"r": Known("r.urdf", copies=("collision.stl",))},
     )
 
 
