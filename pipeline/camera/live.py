@@ -10,7 +10,6 @@ from dataclasses import dataclass, field, replace
 from typing import Generic, TypeVar
 
 import numpy as np
-from jaxtyping import Float
 
 from pipeline.camera.bags import RecordedPicture
 from pipeline.camera.frame import Frame
@@ -74,14 +73,13 @@ class LiveGrasps:
             No support was found.
         """
         config, settings = self._config, self._config.predict
-        frame = _thinned(frame, settings.live.every_px)
         support = self._kept_support(frame, rng)
         parts.done("support")
         level = support.world_from_support
         moved = frame.moved(invert(level))
-        picture = DepthPicture(moved.depth_m, moved.camera)
         policy = config.evaluate.policy
-        cloud = merged_cloud([picture], policy.voxel_m, policy.above_table_m)
+        thin = _thinned(moved, settings.live.cloud_every_px)
+        cloud = merged_cloud([thin], policy.voxel_m, policy.above_table_m)
         eye = moved.camera.world_from_camera[:3, 3]
         distance_m = np.linalg.norm(cloud.points_m - eye, axis=1)
         least = np.maximum(settings.above_support_m, settings.above_support_share * distance_m)
@@ -110,7 +108,7 @@ class LiveGrasps:
         parts.done("contacts")
         if len(found) == 0:
             return _nothing(support)
-        quality = self._ranking([picture], found)
+        quality = self._ranking([_thinned(moved, settings.live.every_px)], found)
         parts.done("ranking")
         kept = apart(found.world_from_contact[:, :3, 3], quality, settings.apart_m)
         best = kept[: settings.live.top]
@@ -207,18 +205,10 @@ def in_recorded_time(
         yield last
 
 
-def _thinned(frame: Frame, every: int) -> Frame:
-    """The frame with every n-th pixel a side."""
-    if every == 1:
-        return frame
-    depth_m: Float[np.ndarray, "h w"] = np.ascontiguousarray(frame.depth_m[::every, ::every])
-    return replace(
-        frame,
-        depth_m=depth_m,
-        camera=thinned(frame.camera, every),
-        allowed=frame.allowed[::every, ::every],
-        colour=None,
-        instances=None,
+def _thinned(frame: Frame, every: int) -> DepthPicture:
+    """The picture of every n-th pixel a side."""
+    return DepthPicture(
+        np.ascontiguousarray(frame.depth_m[::every, ::every]), thinned(frame.camera, every)
     )
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy import ndimage
-from scipy.spatial import ConvexHull, Delaunay, QhullError
+from scipy.spatial import ConvexHull, QhullError
 
 from pipeline.camera.planes import Plane, planes_of
 from pipeline.config.predict import SupportConfig
@@ -173,10 +173,11 @@ def inside(
         away = support.outline_m - middle
         length = np.linalg.norm(away, axis=1, keepdims=True)
         grown = middle + away * (length + config.outline_margin_m) / np.maximum(length, 1e-9)
-        within &= Delaunay(grown).find_simplex(points_m[:, :2]) >= 0
+        edges = ConvexHull(grown).equations  # outward normals and offsets
+        within &= (points_m[:, :2] @ edges[:, :2].T + edges[:, 2] <= 0.0).all(axis=1)
         # A wall whose inner side is hidden shows its rim alone.
-        high = points_m[:, 2] > support.rim_m - config.rim_m
-        within &= ~(high & (_from_edge(support.outline_m, points_m[:, :2]) < config.rim_m))
+        high = within & (points_m[:, 2] > support.rim_m - config.rim_m)
+        within[high] = _from_edge(support.outline_m, points_m[high, :2]) >= config.rim_m
     return within
 
 

@@ -95,7 +95,12 @@ class TrialConfig(Section):
 class LiveConfig(Section):
     """How `make live` answers every picture of a stream."""
 
-    every_px: int = Field(2, ge=1, le=16, description="of so many pixels a side one is used")
+    every_px: int = Field(
+        2, ge=1, le=16, description="of so many pixels a side one is in the clouds that are ranked"
+    )
+    cloud_every_px: int = Field(
+        3, ge=1, le=16, description="the same of contacts, and of what the hand must not meet"
+    )
     candidates: int = Field(96, ge=1, le=4096, description="contacts that are tried a picture")
     top: int = Field(5, ge=1, le=100, description="grasps that are given out a picture")
     support_kept_share: float = Field(

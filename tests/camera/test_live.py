@@ -10,7 +10,7 @@ from pipeline.config import RunConfig
 from pipeline.control.ranking import GeometricRanking
 from tests.camera.scenes import box, seen, table
 
-CONFIG = RunConfig.model_validate({"predict": {"live": {"every_px": 1}}})
+CONFIG = RunConfig.model_validate({"predict": {"live": {"every_px": 1, "cloud_every_px": 1}}})
 MS = 1_000_000
 EYE = (0.05, -0.35, 0.6)
 
@@ -71,7 +71,7 @@ def test_a_support_that_moved_is_found_anew(frame: Frame) -> None:
 
 
 def test_thinned_pictures_give_the_same_place(frame: Frame) -> None:
-    thin = RunConfig.model_validate({"predict": {"live": {"every_px": 2}}})
+    thin = RunConfig.model_validate({"predict": {"live": {"every_px": 2, "cloud_every_px": 3}}})
     best = proposer(thin).propose(frame, np.random.default_rng(0), Parts()).world_from_contact[0]
     assert best[2, 3] == pytest.approx(0.08, abs=0.005)
 
