@@ -17,6 +17,7 @@ from pipeline.execution import RunFolder, progress, run_command
 from pipeline.interchange.graspgen import write_graspgen, write_lists
 from pipeline.interchange.parquet_shards import write_parquet
 from pipeline.interchange.reading import grasps_by_object, read_shard
+from pipeline.interchange.scene_exports import export_bop, export_usd
 from pipeline.network.samples import SPLITS
 from stages.graph import RUNS_DIR
 
@@ -30,6 +31,27 @@ class Format(StrEnum):
     GRASPGEN = "graspgen"
     WEBDATASET = "webdataset"
     PARQUET = "parquet"
+    BOP = "bop"
+    USD = "usd"
+
+
+class Counted(StrEnum):
+    """What a manifest counts."""
+
+    GRASPS = "grasps"
+    SAMPLES = "samples"
+    PICTURES = "pictures"
+    SCENES = "scenes"
+
+
+FROM = {  # format → artifact that is exported, and what is counted
+    Format.ACRONYM: ("grasps", Counted.GRASPS),
+    Format.GRASPGEN: ("grasps", Counted.GRASPS),
+    Format.WEBDATASET: ("shards", Counted.SAMPLES),
+    Format.PARQUET: ("shards", Counted.SAMPLES),
+    Format.BOP: ("scenes", Counted.PICTURES),
+    Format.USD: ("grasps", Counted.SCENES),
+}
 
 
 def export_run(folder: RunFolder, wanted: Format, least_quality: float) -> Path:
@@ -56,7 +78,8 @@ def export_run(folder: RunFolder, wanted: Format, least_quality: float) -> Path:
         The package that writes the format is not installed.
     """
     of_objects = wanted in (Format.ACRONYM, Format.GRASPGEN)
-    source = folder.artifact("grasps" if of_objects else "shards")
+    stage, counted = FROM[wanted]
+    source = folder.artifact(stage)
     if not source.is_file():
         name = folder.path.name
         raise ArtifactError(f"{source} is missing", f"Make it first: make dataset RUN={name}")
@@ -65,6 +88,8 @@ def export_run(folder: RunFolder, wanted: Format, least_quality: float) -> Path:
     try:
         if of_objects:
             count = export_grasps(folder, into, wanted, least_quality)
+        elif wanted in (Format.BOP, Format.USD):
+            count = export_scenes(folder, into, wanted)
         else:
             count = export_samples(source, into, wanted)
     except ModuleNotFoundError as error:
@@ -74,7 +99,7 @@ def export_run(folder: RunFolder, wanted: Format, least_quality: float) -> Path:
         ) from error
     manifest = {
         "format": str(wanted),
-        "grasps" if of_objects else "samples": count,
+        str(counted): count,
         "source": {source.name: read_provenance(source).key},
         "softgrip": package_version(),
     }
@@ -101,6 +126,16 @@ def export_grasps(folder: RunFolder, into: Path, wanted: Format, least_quality: 
     if wanted is Format.GRASPGEN:
         write_lists(into, [(grasps.item.name, grasps.split) for grasps in found])
     return sum(map(len, found))
+
+
+def export_scenes(folder: RunFolder, into: Path, wanted: Format) -> int:
+    """A folder or a file a scene; how many pictures, or scenes."""
+    objects, scenes = folder.artifact("objects"), folder.artifact("scenes")
+    if wanted is Format.BOP:
+        return export_bop(objects, scenes, into)
+    config = load_run_config(folder.config)
+    radius_m, side_m = config.gripper.pad.radius_m, config.scenes.table_side_m
+    return export_usd(objects, scenes, folder.artifact("grasps"), into, radius_m, side_m)
 
 
 def export_samples(source: Path, into: Path, wanted: Format) -> int:

@@ -137,10 +137,11 @@ class PredictConfig(Section):
         description="the same as a share of the distance from the camera, whichever is more [1]",
     )
     quality_min: float = Field(
-        0.3,
+        0.56,
         ge=0,
         le=1,
-        description="under this q-hat no grasp is called good; `make calibrate` chooses it [1]",
+        description="under this q-hat no grasp is called good; `make calibrate` chose it for the "
+        "released network [1]",
     )
     good_quality: float = Field(
         0.5, gt=0, lt=1, description="make calibrate: a grasp is good from this q on [1]"

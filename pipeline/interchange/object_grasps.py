@@ -5,7 +5,7 @@ its +z out of it. Both have their origin at the pad's centre where it first touc
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 import trimesh
@@ -66,6 +66,45 @@ def base_in_object(
 ) -> Float[np.ndarray, "n 4 4"]:
     """Poses of GCS in the world → poses of the formats' gripper base in the object's frame."""
     return np.asarray(invert(world_from_object) @ world_from_gripper @ GCS_FROM_BASE)
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedGrasps:
+    """Grasps of one scene in WCS; arrays of one length n.
+
+    Attributes
+    ----------
+    world_from_gripper
+        GCS at first touch, +z out of the object, shape (n, 4, 4).
+    quality
+        q, shape (n,).
+    pressure
+        p, shape (n,).
+    body_id
+        The object under the pad, shape (n,).
+    """
+
+    world_from_gripper: Float[np.ndarray, "n 4 4"]
+    quality: Float[np.ndarray, " n"]
+    pressure: Float[np.ndarray, " n"]
+    body_id: Int[np.ndarray, " n"]
+
+
+def placed_grasps(grasps: LabelledGrasps) -> PlacedGrasps:
+    """What a scene's file shows of labelled grasps."""
+    return PlacedGrasps(
+        grasps.world_from_gripper, grasps.quality, grasps.pressure, grasps.body_id.astype(np.int64)
+    )
+
+
+def join_placed(parts: Sequence[PlacedGrasps]) -> PlacedGrasps:
+    """Grasps of one scene from several batches, in order; at least one."""
+    return PlacedGrasps(
+        *(
+            np.concatenate([getattr(part, field.name) for part in parts])
+            for field in fields(PlacedGrasps)
+        )
+    )
 
 
 def split_by_body(

@@ -4,7 +4,14 @@ from pathlib import Path
 
 from pipeline.artifacts import from_tensor, open_artifact
 from pipeline.artifacts.sharding import listed_shards
-from pipeline.interchange.object_grasps import ObjectGrasps, join_grasps, split_by_body
+from pipeline.interchange.object_grasps import (
+    ObjectGrasps,
+    PlacedGrasps,
+    join_grasps,
+    join_placed,
+    placed_grasps,
+    split_by_body,
+)
 from pipeline.messages.grasps import grasps_of
 from pipeline.messages.objects import read_objects
 from pipeline.messages.samples import samples_of
@@ -49,6 +56,32 @@ def grasps_by_object(objects: Path, scenes: Path, grasps: Path) -> list[ObjectGr
                 for part in split_by_body(*grasps_of(message), catalogue, poses):
                     parts.setdefault(part.item.name, []).append(part)
     return [join_grasps(parts[name]) for name in catalogue if name in parts]
+
+
+def grasps_by_scene(grasps: Path) -> dict[str, PlacedGrasps]:
+    """Every scene's grasps in WCS, from all viewpoints.
+
+    Parameters
+    ----------
+    grasps
+        Artifact of stage grasps (its index).
+
+    Returns
+    -------
+    Id of a scene → its grasps.
+
+    Raises
+    ------
+    ArtifactError
+        A shard is missing or damaged.
+    """
+    parts: dict[str, list[PlacedGrasps]] = {}
+    for shard in listed_shards(grasps):
+        with open_artifact(shard) as artifact:
+            for _, message in artifact.messages(GraspBatch):
+                origin, found = grasps_of(message)
+                parts.setdefault(origin.scene_id, []).append(placed_grasps(found))
+    return {scene: join_placed(found) for scene, found in parts.items()}
 
 
 def read_shard(shard: Path) -> tuple[Samples, tuple[str, ...]]:
