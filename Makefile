@@ -139,7 +139,7 @@ review: .venv/.ready  ## recordings of RUN (of STAGE alone) in the Rerun viewer
 report: .venv/.ready  ## the run on one page, to runs/<run>/report.html and report.md
 	@$(PY) -m stages.report
 
-export: .venv/.ready  ## dataset as FORMAT=acronym|graspgen|webdataset|parquet|bop|usd, to runs/<run>/export
+export: .venv/.ready  ## dataset as FORMAT=acronym|graspgen|webdataset|parquet|bop|usd|lerobot, to runs/<run>/export
 	@FORMAT=$(or $(FORMAT),acronym) $(PY) -m stages.export
 
 PREDICT_OPTIONS = $(foreach option,camera colour mask instances workspace depth-scale-m radius-mm tilt-deg top out,\

@@ -12,16 +12,19 @@ from loguru import logger
 from pipeline.artifacts import package_version, publish_bytes, read_provenance
 from pipeline.artifacts.sharding import listed_shards
 from pipeline.config import load_run_config
+from pipeline.config.evaluation import PolicyName
 from pipeline.errors import ArtifactError, MachineError
 from pipeline.execution import RunFolder, progress, run_command
 from pipeline.interchange.graspgen import write_graspgen, write_lists
+from pipeline.interchange.lerobot import write_lerobot
 from pipeline.interchange.parquet_shards import write_parquet
-from pipeline.interchange.reading import grasps_by_object, read_shard
+from pipeline.interchange.reading import grasps_by_object, read_episodes, read_shard
 from pipeline.interchange.scene_exports import export_bop, export_usd
 from pipeline.network.samples import SPLITS
 from stages.graph import RUNS_DIR
 
 MANIFEST = "manifest.json"
+CLOSED_LOOP: PolicyName = "closed-loop"  # whose attempts are episodes
 
 
 class Format(StrEnum):
@@ -33,6 +36,7 @@ class Format(StrEnum):
     PARQUET = "parquet"
     BOP = "bop"
     USD = "usd"
+    LEROBOT = "lerobot"
 
 
 class Counted(StrEnum):
@@ -42,6 +46,7 @@ class Counted(StrEnum):
     SAMPLES = "samples"
     PICTURES = "pictures"
     SCENES = "scenes"
+    FRAMES = "frames"
 
 
 FROM = {  # format → artifact that is exported, and what is counted
@@ -51,6 +56,7 @@ FROM = {  # format → artifact that is exported, and what is counted
     Format.PARQUET: ("shards", Counted.SAMPLES),
     Format.BOP: ("scenes", Counted.PICTURES),
     Format.USD: ("grasps", Counted.SCENES),
+    Format.LEROBOT: ("evaluate", Counted.FRAMES),
 }
 
 
@@ -81,8 +87,8 @@ def export_run(folder: RunFolder, wanted: Format, least_quality: float) -> Path:
     stage, counted = FROM[wanted]
     source = folder.artifact(stage)
     if not source.is_file():
-        name = folder.path.name
-        raise ArtifactError(f"{source} is missing", f"Make it first: make dataset RUN={name}")
+        name, goal = folder.path.name, "eval" if stage == "evaluate" else "dataset"
+        raise ArtifactError(f"{source} is missing", f"Make it first: make {goal} RUN={name}")
     into = folder.path / "export" / wanted
     (into / MANIFEST).unlink(missing_ok=True)
     try:
@@ -90,6 +96,8 @@ def export_run(folder: RunFolder, wanted: Format, least_quality: float) -> Path:
             count = export_grasps(folder, into, wanted, least_quality)
         elif wanted in (Format.BOP, Format.USD):
             count = export_scenes(folder, into, wanted)
+        elif wanted is Format.LEROBOT:
+            count = write_lerobot(into, read_episodes(source, CLOSED_LOOP))
         else:
             count = export_samples(source, into, wanted)
     except ModuleNotFoundError as error:

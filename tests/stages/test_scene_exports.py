@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -46,8 +47,9 @@ def folder_of(bop: Path, scenes: list[ClutterScene], number: int) -> Path:
     return bop / scenes[number].split / f"{number:06d}"
 
 
-def loaded(path: Path) -> dict:
-    return json.loads(path.read_text())
+def loaded(path: Path) -> dict[str, Any]:
+    content: dict[str, Any] = json.loads(path.read_text())
+    return content
 
 
 def test_models_are_the_objects_in_millimetres(
