@@ -14,6 +14,7 @@ import numpy as np
 
 from pipeline.artifacts import publish_bytes
 from pipeline.benchmarks import clutter, control, inference, labelling, loading, solvers, storage
+from pipeline.benchmarks.cutting import cutting_time
 from pipeline.config import RunConfig, load_run_config
 from pipeline.execution import RunFolder, generator, run_command, run_in_order
 from pipeline.geometry.catalogue import CatalogueObject
@@ -74,6 +75,7 @@ def measure_all() -> None:
         lambda: inference.figures(config.network, samples),
         lambda: control.figures(scene, bench.meshes, config),
         lambda: clutter.figures(bench.objects.values(), config.scenes),
+        lambda: cutting_time(bench.objects.values(), config.objects.convex),
     )
     for measure in measures:
         found = measure()

@@ -23,6 +23,14 @@ class ConvexPartsConfig(Section):
     input_faces: int = Field(
         2000, ge=100, le=200_000, description="faces the mesh is decimated to before decomposition"
     )
+    # Scans of single things keep 10 000 at most. A lattice of 10 000 takes CoACD 70 s, and the time
+    # grows faster than the faces.
+    max_cut_faces: int = Field(
+        12_000,
+        ge=100,
+        le=1_000_000,
+        description="meshes that keep more faces after decimation are refused: cutting has no end",
+    )
 
 
 class ObjectsConfig(ScaledSection):

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from pipeline.config.objects import ObjectsConfig
 from pipeline.errors import MeshError
-from pipeline.geometry.convex_parts import convex_parts
+from pipeline.geometry.convex_parts import TooIntricateError, convex_parts
 from pipeline.geometry.descriptor import ShapeDescriptor, describe
 from pipeline.geometry.masses import density_of
 from pipeline.geometry.mesh import Mesh
@@ -179,9 +179,19 @@ def finish_object(
         target_extent_m=target,
         **solid_properties(mesh, density_kg_m3),
         mesh=mesh,
-        convex_parts=convex_parts(mesh, config.convex, cache_dir),
+        convex_parts=_parts_of(measured.origin, mesh, config, cache_dir),
         material=material_of(source.name, config),
     )
+
+
+def _parts_of(label: str, mesh: Mesh, config: ObjectsConfig, cache_dir: Path) -> tuple[Mesh, ...]:
+    """The convex parts. Raises MeshError where the mesh is too intricate."""
+    try:
+        return convex_parts(mesh, config.convex, cache_dir)
+    except TooIntricateError as error:
+        raise MeshError(
+            f"{label} {error}", "Simplify the mesh, or raise objects.convex.max_cut_faces"
+        ) from error
 
 
 def stretched_copy(

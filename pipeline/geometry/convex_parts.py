@@ -6,8 +6,7 @@ Tree Search", 2022.
 
 import hashlib
 import importlib.metadata
-import os
-import tempfile
+import io
 import zipfile
 from collections.abc import Sequence
 from functools import lru_cache
@@ -18,6 +17,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import ConvexHull
 
+from pipeline.artifacts.publishing import publish_bytes
 from pipeline.config.objects import ConvexPartsConfig
 from pipeline.geometry.manifolds import from_manifold, to_manifold
 from pipeline.geometry.mesh import Mesh
@@ -33,8 +33,16 @@ _CUBE_CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (
 # Parts with less of the mesh's volume than this have lost some of it.
 _LEAST_COVERAGE = 0.9
 _MOST_DECIMATION_SHARE = 0.02
+# Bodies that are not thin change by 3 % at most.
+_MOST_VOLUME_CHANGE = 0.1
+# Distances of so many points to so many planes are taken at once: 64 MiB.
+_MOST_DISTANCES = 1 << 23
 # Part of the cache key: raise it when what is computed from equal inputs changes.
-_METHOD_VERSION = 8
+_METHOD_VERSION = 9
+
+
+class TooIntricateError(ValueError):
+    """A mesh has too many details to be cut into convex parts; to be read behind its name."""
 
 
 def convex_parts(mesh: Mesh, config: ConvexPartsConfig, cache_dir: Path) -> tuple[Mesh, ...]:
@@ -42,7 +50,7 @@ def convex_parts(mesh: Mesh, config: ConvexPartsConfig, cache_dir: Path) -> tupl
 
     At most config.max_parts parts of at most 127 vertices each; deterministic. Results are kept
     in cache_dir by a digest of mesh, parameters and CoACD's version; a damaged entry is
-    recomputed.
+    recomputed. Raises TooIntricateError as `decompose` does.
     """
     mesh = outer_surface(mesh)
     entry = cache_dir / f"{cache_key(mesh, config)}.npz"
@@ -57,13 +65,19 @@ def decompose(mesh: Mesh, config: ConvexPartsConfig) -> tuple[Mesh, ...]:
     """The convex parts, computed: the hull alone if the mesh is convex, else by CoACD.
 
     The mesh is decimated to config.input_faces first, whose error is far below the concavity
-    that a part may have. CoACD's measure is relative to the mesh's size, so the parts of a
-    rescaled mesh are the rescaled parts.
+    that a part may have. CoACD's measure is relative to the mesh's size, so the parts of a rescaled
+    mesh are the rescaled parts. Raises TooIntricateError where more than config.max_cut_faces
+    are left, as of a sponge: CoACD's work has no bound but that of its faces.
     """
     hull = convex_hull(mesh.vertices_m)
     if volume(mesh) >= _CONVEX_SHARE * volume(hull):
         return (_within_limit(hull),)
     coarse = decimate(mesh, config.input_faces)
+    if len(coarse.faces) > config.max_cut_faces:
+        raise TooIntricateError(
+            f"keeps {len(coarse.faces)} faces when it is simplified, more than the "
+            f"{config.max_cut_faces} that are cut into convex parts"
+        )
     parts = _run_coacd(coarse, config, "off")
     if sum(volume(part) for part in parts) < _LEAST_COVERAGE * volume(mesh):
         parts = _run_coacd(coarse, config, "on")
@@ -118,7 +132,12 @@ def _outside_of(part: Mesh, points_m: Float[np.ndarray, "n 3"]) -> Float[np.ndar
     solid = lengths > 0
     normals = normals[solid] / lengths[solid, None]
     offsets = np.einsum("ij,ij->i", normals, a[solid])
-    return np.asarray((points_m @ normals.T - offsets).max(axis=1))
+    step = max(1, _MOST_DISTANCES // max(1, len(offsets)))
+    found = [
+        (points_m[start : start + step] @ normals.T - offsets).max(axis=1)
+        for start in range(0, len(points_m), step)
+    ]
+    return np.concatenate(found)
 
 
 def convex_hull(points_m: Float[np.ndarray, "n 3"]) -> Mesh:
@@ -140,13 +159,18 @@ def decimate(mesh: Mesh, faces: int) -> Mesh:
     """A closed mesh simplified until it has at most the given number of faces; still closed.
 
     Edges collapse within a tolerance, which doubles from a ten-thousandth of the longest extent
-    to at most 2 %: beyond that the shape matters more than the count.
+    to at most 2 %: beyond that the shape matters more than the count. It ends before that where the
+    walls of a thin body begin to pass through each other, which its volume tells: at 2 % of its
+    width a plate is inside out.
     """
-    extent = float(mesh.extents_m.max())
+    extent, whole = float(mesh.extents_m.max()), volume(mesh)
     coarse, share = mesh, 1e-4
     solid = to_manifold(mesh)
     while len(coarse.faces) > faces and share <= _MOST_DECIMATION_SHARE:
-        coarse = from_manifold(solid.simplify(share * extent))
+        coarser = from_manifold(solid.simplify(share * extent))
+        if len(coarser.faces) == 0 or abs(volume(coarser) - whole) > _MOST_VOLUME_CHANGE * whole:
+            break
+        coarse = coarser
         share *= 2
     return coarse
 
@@ -238,16 +262,13 @@ def _read(entry: Path) -> tuple[Mesh, ...] | None:
 
 
 def _write(entry: Path, parts: tuple[Mesh, ...]) -> None:
-    """Written beside its place and renamed: a reader never meets half an entry."""
-    entry.parent.mkdir(parents=True, exist_ok=True)
-    with tempfile.NamedTemporaryFile(dir=entry.parent, suffix=".tmp", delete=False) as file:
-        np.savez_compressed(
-            file,
-            vertices_m=np.concatenate([part.vertices_m for part in parts]),
-            faces=np.concatenate([part.faces for part in parts]),
-            vertex_ends=np.cumsum([len(part.vertices_m) for part in parts]),
-            face_ends=np.cumsum([len(part.faces) for part in parts]),
-        )
-        file.flush()
-        os.fsync(file.fileno())
-    Path(file.name).replace(entry)
+    """Written whole or not at all; what a killed process leaves is cleared with the run's."""
+    data = io.BytesIO()
+    np.savez_compressed(
+        data,
+        vertices_m=np.concatenate([part.vertices_m for part in parts]),
+        faces=np.concatenate([part.faces for part in parts]),
+        vertex_ends=np.cumsum([len(part.vertices_m) for part in parts]),
+        face_ends=np.cumsum([len(part.faces) for part in parts]),
+    )
+    publish_bytes(entry, data.getvalue())

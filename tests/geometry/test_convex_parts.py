@@ -7,7 +7,14 @@ import pytest
 import trimesh
 
 from pipeline.config import ObjectsConfig
-from pipeline.geometry.convex_parts import cache_key, convex_parts
+from pipeline.geometry import convex_parts as convex_module
+from pipeline.geometry.convex_parts import (
+    TooIntricateError,
+    cache_key,
+    convex_parts,
+    decimate,
+    decompose,
+)
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.shape import volume
 from tests.bodies import mesh_of
@@ -89,3 +96,39 @@ def test_the_key_knows_mesh_and_settings() -> None:
     moved = Mesh(mesh.vertices_m + 1e-12, mesh.faces)
     coarser = CONFIG.model_copy(update={"concavity": 0.2})
     assert len({cache_key(mesh, CONFIG), cache_key(moved, CONFIG), cache_key(mesh, coarser)}) == 3
+
+
+def sheet(size_m: float, thickness_m: float, bend_m: float) -> Mesh:
+    """A wavy sheet of two closed sides, finely meshed, as of a scanned plate."""
+    plate = trimesh.creation.box(extents=(size_m, size_m, thickness_m))
+    for _ in range(5):
+        plate = plate.subdivide()
+    waves = bend_m * np.sin(20 * plate.vertices[:, 0]) * np.sin(20 * plate.vertices[:, 1])
+    return mesh_of(trimesh.Trimesh(plate.vertices + [[0, 0, 1]] * waves[:, None], plate.faces))
+
+
+def test_a_thin_body_is_not_simplified_until_it_turns_inside_out() -> None:
+    plate = sheet(0.3, 0.002, 0.02)
+    coarse = decimate(plate, 50)
+    assert len(coarse.faces) < 0.5 * len(plate.faces)
+    assert volume(coarse) == pytest.approx(volume(plate), rel=0.1)
+
+
+def test_a_body_that_is_not_thin_is_simplified_to_the_count() -> None:
+    ball = mesh_of(trimesh.creation.icosphere(subdivisions=5))
+    assert len(decimate(ball, 1000).faces) <= 1000
+
+
+def test_a_mesh_of_too_many_details_is_refused_before_it_is_cut(tmp_path: Path) -> None:
+    few = CONFIG.model_copy(update={"max_cut_faces": 20, "input_faces": 20})
+    with pytest.raises(TooIntricateError, match=r"keeps \d+ faces .* more than the 20 that are"):
+        convex_parts(cross(), few, tmp_path)
+
+
+def test_distances_of_many_points_are_taken_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+    (part,) = decompose(mesh_of(trimesh.creation.icosphere(subdivisions=2)), CONFIG)
+    points = np.random.default_rng(0).normal(size=(1000, 3))
+    whole = convex_module._outside_of(part, points)
+    monkeypatch.setattr(convex_module, "_MOST_DISTANCES", 7 * len(part.faces))
+    np.testing.assert_allclose(convex_module._outside_of(part, points), whole, atol=1e-12)
+    np.testing.assert_allclose(whole, outside_m(part, points), atol=1e-12)
