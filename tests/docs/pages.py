@@ -38,6 +38,10 @@ REDUCED = {
         "make -n calibrate RUN=ci",
         "the tiny run has too few samples; tests/stages/test_calibrate.py runs it",
     ),
+    "make referee RUN=unseen MESH_DIR=meshes": (
+        "make -n referee RUN=unseen MESH_DIR=meshes",
+        "half an hour; tests/stages/test_referee.py judges a few grasps",
+    ),
     "make review RUN=ci STAGE=grasps": (
         "make -n review RUN=ci STAGE=grasps",
         "it ends when its viewer is closed; tests/stages/test_review.py opens it",
