@@ -32,6 +32,7 @@ from stages.holdout import labelled
 from stages.train import print_epoch
 
 NAME = "folds"
+FOLDS = 5  # a fifth of the families is tested on at a time; what make passes in FOLDS wins
 FEWEST_FOLDS = 3  # one to test on, one to choose the epoch on, one to train on
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 RunName = Annotated[str, typer.Option(envvar="RUN", help="name of the run")]
@@ -45,7 +46,7 @@ def fold_folder(folder: RunFolder, fold: int) -> RunFolder:
 
 
 @app.command()
-def prepare(run: RunName = "default", folds: Folds = 5, runs_dir: RunsDir = RUNS_DIR) -> None:
+def prepare(run: RunName = "default", folds: Folds = FOLDS, runs_dir: RunsDir = RUNS_DIR) -> None:
     """Write the run.toml of the objects that are dealt."""
     own = RunFolder(runs_dir / run).config
     config = folds_config(load_run_config(own) if own.is_file() else RunConfig(), folds)
@@ -53,7 +54,7 @@ def prepare(run: RunName = "default", folds: Folds = 5, runs_dir: RunsDir = RUNS
 
 
 @app.command()
-def deal(run: RunName = "default", folds: Folds = 5, runs_dir: RunsDir = RUNS_DIR) -> None:
+def deal(run: RunName = "default", folds: Folds = FOLDS, runs_dir: RunsDir = RUNS_DIR) -> None:
     """Give each fold a run of its own, with its objects alone."""
     folder = RunFolder(runs_dir / run / NAME)
     objects = {name: item for name, (item, _) in read_objects(folder.artifact("objects")).items()}
@@ -79,7 +80,7 @@ def tested(names: Collection[str]) -> set[str]:
 
 
 @app.command()
-def measure(run: RunName = "default", folds: Folds = 5, runs_dir: RunsDir = RUNS_DIR) -> None:
+def measure(run: RunName = "default", folds: Folds = FOLDS, runs_dir: RunsDir = RUNS_DIR) -> None:
     """Train a network for each fold and test it there."""
     began = time.perf_counter()
     folder = RunFolder(runs_dir / run / NAME)
