@@ -21,6 +21,7 @@ DOCUMENTED = ("pipeline", "stages")
 PAGES = {  # page of the repository → file of the site
     "README.md": "index.html",
     "pipeline/README.md": "science.html",
+    "runs/FIRST_HOUR.md": "first_hour.html",
     "runs/README.md": "running.html",
     "stages/README.md": "stages.html",
     "schemas/README.md": "files.html",

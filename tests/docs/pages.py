@@ -7,6 +7,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PAGES = (
     "README.md",
     "pipeline/README.md",
+    "runs/FIRST_HOUR.md",
     "runs/README.md",
     "schemas/README.md",
     "stages/README.md",
@@ -25,6 +26,10 @@ REDUCED = {
     " make regress AFRESH=embree": (
         "make -n regress AFRESH=embree",
         "CI runs it",
+    ),
+    "make train RUN=first MESH_DIR=meshes": (
+        "make -n train RUN=first MESH_DIR=meshes",
+        "the test's folder holds three meshes; README's commands train run ci from nothing",
     ),
     "make real FRAMES=runs/pictures": (
         "make -n real FRAMES=runs/pictures",
