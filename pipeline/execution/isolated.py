@@ -26,6 +26,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Generic, Self, TypeVar
 
+import numpy as np
+
 from pipeline.errors import SoftgripError
 from pipeline.execution.executors import Executor, defer_interrupts
 
@@ -35,6 +37,7 @@ Result = TypeVar("Result")
 # Results that may wait for their turn, a process: they are few and small, items take unequal time.
 AHEAD_PER_WORKER = 16
 MIB = 1 << 20
+_BLAS_BEGINS_AT = 256  # rows of a matrix too large for loops that need no buffer
 _KILLED_WITH_PARENT = 1  # PR_SET_PDEATHSIG of prctl(2)
 
 
@@ -297,22 +300,29 @@ def _serve(requests: connection.Connection, allowance: Allowance, parent: int) -
     if os.getppid() != parent:  # it had died before
         return
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    bounded = False
+    unbounded = resource.getrlimit(resource.RLIMIT_DATA)
+    bounded = unbounded
     while True:
         try:
             job, item = requests.recv()
         except EOFError:
             return
-        if not bounded:  # not before: reading the first item has loaded the modules
-            _bound_memory(allowance.memory_mib)
-            bounded = True
+        if bounded is unbounded:  # not before: reading the first item has loaded the modules
+            # OpenBLAS ends the process where it finds no memory for its buffers: have them now.
+            np.linalg.inv(np.eye(_BLAS_BEGINS_AT))
+            bounded = _memory_bound(allowance.memory_mib)
         requests.send((False, None))
+        resource.setrlimit(resource.RLIMIT_DATA, bounded)
         try:
             outcome = job(item)
         except MemoryError:
+            # What the job holds is still there: without this, words and answer find no memory.
+            resource.setrlimit(resource.RLIMIT_DATA, unbounded)
             outcome = Lost(f"took more than {allowance.memory_mib} MiB of memory")
         except Exception as error:  # noqa: BLE001 - raised again where its turn comes
+            resource.setrlimit(resource.RLIMIT_DATA, unbounded)
             outcome = _Raised(_sendable(error), traceback.format_exc())
+        resource.setrlimit(resource.RLIMIT_DATA, unbounded)
         requests.send((True, outcome))
 
 
@@ -325,14 +335,12 @@ def _sendable(error: Exception) -> Exception:
     return error
 
 
-def _bound_memory(memory_mib: int) -> None:
-    """Let this process have so much more private memory; the kernel refuses it the rest."""
+def _memory_bound(memory_mib: int) -> tuple[int, int]:
+    """The limit of private memory that leaves this process so much more than it has now."""
     pages = int(Path("/proc/self/statm").read_text().split()[5])
     most = pages * resource.getpagesize() + memory_mib * MIB
     _, hard = resource.getrlimit(resource.RLIMIT_DATA)
-    if hard != resource.RLIM_INFINITY:
-        most = min(most, hard)
-    resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
+    return (most if hard == resource.RLIM_INFINITY else min(most, hard)), hard
 
 
 def _result(outcome: Any) -> Any:
