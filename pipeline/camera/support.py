@@ -173,8 +173,10 @@ def inside(
         away = support.outline_m - middle
         length = np.linalg.norm(away, axis=1, keepdims=True)
         grown = middle + away * (length + config.outline_margin_m) / np.maximum(length, 1e-9)
-        edges = ConvexHull(grown).equations  # outward normals and offsets
-        within &= (points_m[:, :2] @ edges[:, :2].T + edges[:, 2] <= 0.0).all(axis=1)
+        x, y = np.ascontiguousarray(points_m[:, :2].T)
+        # Edge by edge: a matrix product waits for OpenBLAS's threads, ten times as long.
+        for outward_x, outward_y, offset in ConvexHull(grown).equations:
+            within &= outward_x * x + outward_y * y + offset <= 0.0
         # A wall whose inner side is hidden shows its rim alone.
         high = within & (points_m[:, 2] > support.rim_m - config.rim_m)
         within[high] = _from_edge(support.outline_m, points_m[high, :2]) >= config.rim_m
