@@ -36,14 +36,17 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
-from pipeline.config.learning import NetworkConfig
+from pipeline.config.learning import (
+    CHANNELS_PER_GROUP,
+    DEEPEST,
+    LAYERS_PER_BLOCK,
+    SHALLOWEST,
+    NetworkConfig,
+)
 from pipeline.errors import ConfigError
 from pipeline.network.canonical import CHANNELS, Channels
 
-SHALLOWEST = 18  # Supplement IV: depths from 18 to 102 layers
-DEEPEST = 102  # Supplement IV: depths from 18 to 102 layers
 STEM_LAYERS = 2  # Supplement IV: a 2-layer CNN of 3x3 comes first
-LAYERS_PER_BLOCK = 2  # of a residual block, as depths are counted
 HEAD_LAYERS = 2  # fully connected layers after the last stage
 
 # Blocks beyond an even share go to the stages of middle resolution first: the first stage is the
@@ -51,11 +54,8 @@ HEAD_LAYERS = 2  # fully connected layers after the last stage
 _REMAINDER_ORDER = (2, 1, 3)
 _STAGE_STRIDES = (1, 2, 2, 1)
 
-# Sixteen channels a group fill one vector register of single precision, and bring the network of
-# Supplement IV to its 3.23 M parameters.
-_CHANNELS_PER_GROUP = 16
-_ATTENTION_REDUCTION = 16
-_HEAD_REDUCTION = 4
+_ATTENTION_REDUCTION = 16  # CBAM and its forerunner SE both take 16
+_HEAD_REDUCTION = 4  # of our own choice, as Supplement IV leaves the head open
 # Maps are 12, 6 and 3 cells wide: the customary 7×7 would span most of them.
 _SPATIAL_ATTENTION_KERNEL = 3
 
@@ -128,7 +128,7 @@ class AttentionBlock(nn.Module):
         self, inputs: int, outputs: int, stride: int, attention: Literal["cbam", "none"]
     ) -> None:
         super().__init__()
-        groups = max(inputs // _CHANNELS_PER_GROUP, 1)
+        groups = max(inputs // CHANNELS_PER_GROUP, 1)
         self.neighbours = nn.Conv2d(
             inputs, inputs, 3, stride=stride, padding=1, groups=groups, bias=False
         )
@@ -172,7 +172,6 @@ class GaCnn(nn.Module):
         super().__init__()
         self.config = config
         self.channels = channels
-        _check_channels(config.channels)
         first, last = config.channels[0], config.channels[-1]
         self.stem = nn.Sequential(
             nn.Conv2d(len(channels), first // 2, 3, padding=1, bias=False),
@@ -246,13 +245,3 @@ def weighted_layer_count(network: GaCnn) -> int:
         for name, module in network.named_modules()
         if not any(part in beside_the_path for part in name.split("."))
     )
-
-
-def _check_channels(channels: tuple[int, int, int, int]) -> None:
-    """Raise ConfigError unless the grouped convolutions divide evenly."""
-    for count in channels:
-        if count < 2 or (count > _CHANNELS_PER_GROUP and count % _CHANNELS_PER_GROUP):
-            raise ConfigError(
-                f"network.channels = {channels} holds {count}, which cannot be grouped",
-                f"Choose multiples of {_CHANNELS_PER_GROUP}, or smaller even numbers.",
-            )

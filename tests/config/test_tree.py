@@ -67,7 +67,7 @@ def test_table_one_is_the_default_pad() -> None:
             "cameras.wrist.near_m=0.3\nevaluate.policy.wrist_view_rg=2.1",
             r"wrist.s camera 0\.28\d* m",
         ),
-        ("[network]\nlayers=19", r"'network\.layers' = 19.*multiple of 2"),
+        ("[network]\nlayers=19", r"'network\.layers' = 19.*even number from 18"),
         ("[objects]\nlimit=2", r"limit must be 0 or at least 3"),
         ("[scenes.clutters_per_level]\nval=0", r"clutters_per_level\.val' = 0"),
         ("[sensing]\ngrid_cells=32", r"grid_side_rg / grid_cells is 0\.075, .* cells of 0\.1"),

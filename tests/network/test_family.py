@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from pipeline.config.learning import NetworkConfig, SweepConfig
-from pipeline.errors import ConfigError
 from pipeline.network.canonical import CHANNELS
 from pipeline.network.family import (
     VARIANTS,
@@ -41,8 +41,8 @@ def test_ablation_leaves_out_one_part_at_a_time() -> None:
 
 
 def test_a_depth_that_no_member_has_is_refused_before_any_training() -> None:
-    with pytest.raises(ConfigError, match="19"):
-        list_members(SweepConfig(depths=(18, 19)), OF_RUN, seed=0)
+    with pytest.raises(ValidationError, match="19 is no depth of the GA-CNN family"):
+        SweepConfig(depths=(18, 19))
 
 
 def test_multiply_adds_are_those_of_the_layers_sizes() -> None:

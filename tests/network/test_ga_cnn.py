@@ -2,13 +2,12 @@
 
 import pytest
 import torch
+from pydantic import ValidationError
 
-from pipeline.config.learning import NetworkConfig
+from pipeline.config.learning import DEEPEST, SHALLOWEST, NetworkConfig
 from pipeline.errors import ConfigError
 from pipeline.network.canonical import CHANNELS
 from pipeline.network.ga_cnn import (
-    DEEPEST,
-    SHALLOWEST,
     blocks_per_stage,
     build_network,
     parameter_count,
@@ -54,11 +53,11 @@ def test_more_depth_and_more_channels_are_more_parameters() -> None:
 @pytest.mark.parametrize("layers", [19, 51, 101])
 def test_depth_outside_the_family_names_the_depths_inside(layers: int) -> None:
     with pytest.raises(ConfigError, match=f"{layers}.*even number from 18 to 102"):
-        build_network(NetworkConfig(layers=layers), seed=0)
+        blocks_per_stage(layers)
 
 
 def test_channels_that_cannot_be_grouped_are_refused() -> None:
-    with pytest.raises(ConfigError, match="multiples of 16"):
+    with pytest.raises(ValidationError, match="multiples of 16"):
         build_network(NetworkConfig(channels=(24, 32, 64, 128)), seed=0)
 
 
