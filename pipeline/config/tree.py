@@ -167,8 +167,9 @@ def load_run_config(path: Path) -> RunConfig:
 
     Raises
     ------
-    ConfigError : the file is absent, is not TOML, or holds a key or value that
-        the tree does not allow; the message names the key and the nearest one.
+    ConfigError
+        The file is absent, is not TOML, or holds a key or value that the tree does not allow; the
+        message names the key and the nearest one.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -192,9 +193,18 @@ def load_run_config(path: Path) -> RunConfig:
 
 
 def section_digest(config: RunConfig, sections: tuple[str, ...]) -> str:
-    """SHA-256 over the named sections' values, derived ones included, whatever the file's layout.
+    """SHA-256 over the values of some sections, derived ones included, whatever the file's layout.
 
-    sections : names such as ``"grasps"`` or, for one field of a section, ``"recording.grasps"``.
+    Parameters
+    ----------
+    config
+        The tree of a run.
+    sections
+        Names such as ``"grasps"`` or, for one field of a section, ``"recording.grasps"``.
+
+    Returns
+    -------
+    The digest, as 64 hexadecimal digits.
     """
     values = {name: _plain(operator.attrgetter(name)(config)) for name in sections}
     return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()

@@ -116,7 +116,7 @@ def _pressed(
 ) -> tuple[Float[np.ndarray, " n"], float]:
     """Face and rest height of the back that carry the force: regula falsi, Illinois.
 
-    near : a face to start from. above : a rest height that carries less.
+    The search starts from the face ``near`` and the rest height ``above``, which carries less.
     """
     n = len(springs)
     diagonal = springs.copy()
