@@ -233,6 +233,12 @@ class PolicyConfig(ScaledSection):
     tug_rg: float = Field(
         0.4, gt=0, description="first part of the lift, in which a seal shows its pull [r_G]"
     )
+    lift_share: float = Field(
+        1.3, ge=1, le=4, description="height that the lift aims at, over the one that counts [1]"
+    )
+    slip_speed_share: float = Field(
+        0.5, gt=0, le=1, description="of speed_m_s, what the lift goes on with after a slip [1]"
+    )
     trim_from_rg: float = Field(
         1.2, ge=0, description="lift from which the pose is trimmed: clear of neighbours [r_G]"
     )

@@ -251,7 +251,8 @@ class Attempt:
     def _lift(self) -> Cause | None:
         """Lift the object; tilt the gripper to reduce moments at its base; slower after a slip."""
         start = self._robot.pose()
-        height, speed = 1.3 * self._config.lift.height_m, self._policy.speed_m_s
+        height_m = self._policy.lift_share * self._config.lift.height_m
+        speed_m_s = self._policy.speed_m_s
         left = self._policy.trim_max_rad if self._strategy.feels else 0.0
         reading = None
         while True:
@@ -260,14 +261,14 @@ class Attempt:
             if reading is not None and left > 0 and risen >= self._policy.trim_from_m:
                 target, turned = trim_pose(target, reading.wrench, left, self._policy)
                 left -= turned
-            target[:2, 3], target[2, 3] = start[:2, 3], start[2, 3] + height
-            reading = self._robot.step(target, speed)
+            target[:2, 3], target[2, 3] = start[:2, 3], start[2, 3] + height_m
+            reading = self._robot.step(target, speed_m_s)
             event = self._monitor.carrying(reading)
             if event is Event.LOSS:
                 self._robot.vacuum(on=False)
                 return Cause.LOST_IN_LIFT
             if event is Event.SLIP:
-                speed = self._policy.speed_m_s / 2
+                speed_m_s = self._policy.slip_speed_share * self._policy.speed_m_s
             if reading.arrived or not reading.followed:
                 return None
 

@@ -24,7 +24,7 @@ from pipeline.geometry.object_names import readable_name
 from pipeline.geometry.parametric import PARAMETRIC_OBJECTS, parametric_source
 from pipeline.geometry.urdf_files import load_object_file, standalone
 
-Made = TypeVar("Made")
+Result = TypeVar("Result")
 
 Source = tuple[Path | None, str]
 """A mesh file and its path in its folder; None and the name of an embedded object."""
@@ -128,7 +128,7 @@ def finished_or_why_not(
     return made_or_why_not(measured.origin, make)
 
 
-def made_or_why_not(label: str, make: Callable[[], Made]) -> Made | MeshError:
+def made_or_why_not(label: str, make: Callable[[], Result]) -> Result | MeshError:
     """What is made of a mesh, or why it is left out.
 
     Parameters
