@@ -143,7 +143,19 @@ def _outside_of(part: Mesh, points_m: Float[np.ndarray, "n 3"]) -> Float[np.ndar
 def convex_hull(points_m: Float[np.ndarray, "n 3"]) -> Mesh:
     """The convex hull as a closed mesh with outward faces.
 
-    Raises scipy.spatial.QhullError where the points lie in a plane.
+    Parameters
+    ----------
+    points_m
+        Any points, shape (n, 3) [m].
+
+    Returns
+    -------
+    The hull.
+
+    Raises
+    ------
+    scipy.spatial.QhullError
+        The points lie in a plane.
     """
     # QJ moves flat points aside instead of merging facets: slivers of CoACD pass.
     hull = ConvexHull(points_m, qhull_options="QJ Pp")

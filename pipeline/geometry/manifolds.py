@@ -9,7 +9,19 @@ from pipeline.geometry.mesh import Mesh
 def to_manifold(mesh: Mesh) -> manifold3d.Manifold:
     """The solid that a closed, outward mesh bounds, in float64.
 
-    Raises ValueError where the faces do not pair up along their edges.
+    Parameters
+    ----------
+    mesh
+        Closed, faces outward [m].
+
+    Returns
+    -------
+    The solid.
+
+    Raises
+    ------
+    ValueError
+        The faces do not pair up along their edges.
     """
     solid = manifold3d.Manifold(
         manifold3d.Mesh64(

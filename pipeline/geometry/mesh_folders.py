@@ -19,7 +19,20 @@ def list_mesh_files(folder: Path) -> list[Path]:
 
     Known suffixes only, hidden files and folders left out. Links are listed where they lead to a
     file inside the folder and left out where they lead outside; linked folders are not entered.
-    Raises MeshError where the folder is missing, holds no mesh, or a file's name is no text.
+
+    Parameters
+    ----------
+    folder
+        Looked through with its subfolders.
+
+    Returns
+    -------
+    Their paths.
+
+    Raises
+    ------
+    MeshError
+        The folder is missing, holds no mesh, or a file's name is no text.
     """
     if not folder.is_dir():
         raise MeshError(f"{folder} is not a folder", "Point MESH_DIR at a folder of meshes")

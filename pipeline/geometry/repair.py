@@ -27,11 +27,25 @@ _LEAST_FULLNESS = 1e-6
 def repair(label: str, mesh: Mesh, max_hole_fraction: float) -> tuple[Mesh, tuple[str, ...]]:
     """The watertight surface, and what was done to get it (nothing: an empty tuple).
 
-    max_hole_fraction: largest share of the surface that closing its openings may add [1].
-    The result is closed, consistently wound, of one connected body: its outer surface points
-    outward, the shells of its cavities, if any, inward, so that volume and mass lack them.
-    Raises MeshError, naming the mesh and the reason, where no honest repair leads there: an open
-    shell has no inside, and no number is made up for it.
+    Parameters
+    ----------
+    label
+        The mesh, as errors name it.
+    mesh
+        As it was read [m].
+    max_hole_fraction
+        Largest share of the surface that closing its openings may add [1].
+
+    Returns
+    -------
+    Closed, consistently wound and of one connected body: its outer surface points outward, the
+    shells of its cavities, if any, inward, so that volume and mass lack them.
+
+    Raises
+    ------
+    MeshError
+        No honest repair leads there: an open shell has no inside, and no number is made up for it.
+        The message names the mesh and the reason.
     """
     done: list[str] = []
     if not topology.is_closed(mesh):

@@ -28,7 +28,22 @@ def rescale(mesh: Mesh, target_extent_m: float) -> tuple[Mesh, float]:
     """The mesh scaled about its origin so that its longest extent is the target, and the scale.
 
     The longest extent is that of the axis-aligned box in the mesh's own frame.
-    Raises ValueError for a mesh of extent zero.
+
+    Parameters
+    ----------
+    mesh
+        In any unit.
+    target_extent_m
+        Longest side of the box around the result [m].
+
+    Returns
+    -------
+    The mesh [m], and its lengths over those of the one given.
+
+    Raises
+    ------
+    ValueError
+        The mesh has extent zero.
     """
     longest = float(mesh.extents_m.max())
     if not longest > 0.0:

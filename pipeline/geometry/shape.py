@@ -72,7 +72,19 @@ def volume(mesh: Mesh) -> float:
 def nsvr(mesh: Mesh) -> float:
     """NSVR of Eq. (15): sqrt(A) / cbrt(V) of a closed mesh's outer surface [1]; free of scale.
 
-    Raises ValueError where the volume is not positive: open or inverted surfaces have no NSVR.
+    Parameters
+    ----------
+    mesh
+        Closed, faces outward, in any unit.
+
+    Returns
+    -------
+    At least 2.199, that of a ball.
+
+    Raises
+    ------
+    ValueError
+        The volume is not positive: open or inverted surfaces have no NSVR.
     """
     outer = outer_surface(mesh)
     enclosed = volume(outer)
@@ -110,7 +122,22 @@ def mass_properties(mesh: Mesh, density_kg_m3: float) -> MassProperties:
     """Mass, centre of mass and inertia of a closed mesh filled with one density.
 
     Exact for the polyhedron: sums over the signed tetrahedra between its faces and one point.
-    Raises ValueError where the volume is not positive.
+
+    Parameters
+    ----------
+    mesh
+        Closed, faces outward [m].
+    density_kg_m3
+        Of the whole inside [kg/m3].
+
+    Returns
+    -------
+    Mass [kg], centre [m] and inertia about it [kg m2], in the mesh's frame.
+
+    Raises
+    ------
+    ValueError
+        The volume is not positive.
     """
     reference = _reference(mesh)
     corners, volumes = _tetrahedra(mesh, reference)

@@ -32,7 +32,21 @@ def pose_from(
 ) -> Float[np.ndarray, "4 4"]:
     """a_from_b of b's origin in a and a quaternion, which need not have unit length.
 
-    Raises ValueError for a quaternion of length zero.
+    Parameters
+    ----------
+    position_m
+        Origin of b in a [m].
+    quaternion_wxyz
+        Turns b's axes into a's.
+
+    Returns
+    -------
+    The pose, shape (4, 4).
+
+    Raises
+    ------
+    ValueError
+        The quaternion has length zero.
     """
     a_from_b = np.eye(4)
     a_from_b[:3, :3] = Rotation.from_quat(quaternion_wxyz, scalar_first=True).as_matrix()
@@ -55,7 +69,22 @@ def frame_from_z(
 
     x is the world axis least aligned with z (the first such in a tie), made orthogonal to z:
     deterministic, and never ill-conditioned. z_axis need not have unit length.
-    Raises ValueError for a z_axis of length zero.
+
+    Parameters
+    ----------
+    origin_m
+        Of the frame, in the world [m].
+    z_axis
+        Its z direction in the world, of any length.
+
+    Returns
+    -------
+    The pose, shape (4, 4).
+
+    Raises
+    ------
+    ValueError
+        ``z_axis`` has length zero.
     """
     z = _unit(np.asarray(z_axis, dtype=np.float64), "z_axis")
     helper = np.eye(3)[np.argmin(np.abs(z))]
@@ -69,7 +98,22 @@ def look_at(
     """world_from_camera (CCS: x right, y down, z forward) at eye_m, looking at target_m.
 
     World z is up in the picture; for a view straight along z, world y is.
-    Raises ValueError if eye and target coincide.
+
+    Parameters
+    ----------
+    eye_m
+        The camera's centre in the world [m].
+    target_m
+        What its axis goes through, in the world [m].
+
+    Returns
+    -------
+    The pose, shape (4, 4).
+
+    Raises
+    ------
+    ValueError
+        Eye and target coincide.
     """
     eye = np.asarray(eye_m, dtype=np.float64)
     z = _unit(np.asarray(target_m, dtype=np.float64) - eye, "target - eye")

@@ -59,8 +59,26 @@ def load_urdf_file(path: Path, folder: Path, name: str, config: ObjectsConfig) -
 
     A link's visual geometry is taken, its collision geometry where it has none.
 
-    Raises MeshError, naming the file and the reason, where the file is no URDF, its links can
-    move against each other, or a mesh is missing, leads out of the folder or cannot be read.
+    Parameters
+    ----------
+    path
+        The URDF.
+    folder
+        The mesh folder; no mesh is read outside it.
+    name
+        What the object is called.
+    config
+        Units and bounds of files.
+
+    Returns
+    -------
+    The object in metres, and where it came from.
+
+    Raises
+    ------
+    MeshError
+        The file is no URDF, its links can move against each other, or a mesh is missing, leads out
+        of the folder or cannot be read; the message names the file and the reason.
     """
     label = path.relative_to(folder).as_posix()
     root = _root(path, folder)

@@ -43,7 +43,14 @@ def choose_vulkan_driver() -> None:
 def new_render_system() -> sapien.render.RenderSystem:
     """A SAPIEN render system on the chosen driver.
 
-    Raises MachineError where no Vulkan driver can render, or pictures would have no light.
+    Returns
+    -------
+    The system.
+
+    Raises
+    ------
+    MachineError
+        No Vulkan driver can render, or pictures would have no light.
     """
     if _COACD_CAME_FIRST:
         raise MachineError(

@@ -21,7 +21,21 @@ _COMMA = re.compile(rb"[+-]?\d*,\d+([eE][+-]?\d+)?|[+-]?[\d.]+,")
 def text_of(label: str, data: bytes) -> bytes:
     """The text with LF line ends and one at its end, without a byte-order mark.
 
-    Raises MeshError for UTF-16, and for bytes that no text has.
+    Parameters
+    ----------
+    label
+        The file, as errors name it.
+    data
+        Its bytes.
+
+    Returns
+    -------
+    The text, as bytes.
+
+    Raises
+    ------
+    MeshError
+        It is UTF-16, or holds bytes that no text has.
     """
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise MeshError(f"{label} is UTF-16 text", "Save it as UTF-8 or plain ASCII")
