@@ -13,8 +13,13 @@ LAYERS_PER_BLOCK = 2  # weighted layers of a residual block: so every depth is e
 CHANNELS_PER_GROUP = 16
 
 
+def is_family_depth(layers: int) -> bool:
+    """Whether GA-CNN has a member of so many weighted layers: an even number from 18 to 102."""
+    return layers % LAYERS_PER_BLOCK == 0 and SHALLOWEST <= layers <= DEEPEST
+
+
 def _of_the_family(layers: int) -> int:
-    if layers % LAYERS_PER_BLOCK or not SHALLOWEST <= layers <= DEEPEST:
+    if not is_family_depth(layers):
         raise ValueError(
             f"{layers} is no depth of the GA-CNN family: an even number from {SHALLOWEST} to "
             f"{DEEPEST}"

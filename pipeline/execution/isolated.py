@@ -314,15 +314,14 @@ def _serve(requests: connection.Connection, allowance: Allowance, parent: int) -
         requests.send((False, None))
         resource.setrlimit(resource.RLIMIT_DATA, bounded)
         try:
-            outcome = job(item)
+            try:
+                outcome = job(item)
+            finally:  # before words are found: what the job holds is still there
+                resource.setrlimit(resource.RLIMIT_DATA, unbounded)
         except MemoryError:
-            # What the job holds is still there: without this, words and answer find no memory.
-            resource.setrlimit(resource.RLIMIT_DATA, unbounded)
             outcome = Lost(f"took more than {allowance.memory_mib} MiB of memory")
         except Exception as error:  # noqa: BLE001 - raised again where its turn comes
-            resource.setrlimit(resource.RLIMIT_DATA, unbounded)
             outcome = _Raised(_sendable(error), traceback.format_exc())
-        resource.setrlimit(resource.RLIMIT_DATA, unbounded)
         requests.send((True, outcome))
 
 

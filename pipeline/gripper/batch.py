@@ -209,8 +209,8 @@ def label_batch(
             batch.weights[rows],
         )
     # Problems a thousandfold off the usual scale may end the structured solver in rounding.
-    careful = config.model_copy(update={"solver": "piqp-dense"})
     for row in np.flatnonzero(~np.isfinite(batch.q)).tolist():
+        careful = config.model_copy(update={"solver": "piqp-dense"})
         _store(batch, row, label_reference(pad, careful, heights[row], target_mask[row]))
     return batch
 

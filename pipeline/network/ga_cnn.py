@@ -42,6 +42,7 @@ from pipeline.config.learning import (
     LAYERS_PER_BLOCK,
     SHALLOWEST,
     NetworkConfig,
+    is_family_depth,
 )
 from pipeline.errors import ConfigError
 from pipeline.network.canonical import CHANNELS, Channels
@@ -77,7 +78,7 @@ def blocks_per_stage(layers: int) -> tuple[int, int, int, int]:
     ConfigError
         No member of the family has this depth; the message names those that exist.
     """
-    if layers % LAYERS_PER_BLOCK or not SHALLOWEST <= layers <= DEEPEST:
+    if not is_family_depth(layers):
         raise ConfigError(
             f"network.layers = {layers} is not a depth of the GA-CNN family",
             f"Choose an even number from {SHALLOWEST} to {DEEPEST} "
