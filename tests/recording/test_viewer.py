@@ -4,6 +4,7 @@ import ipaddress
 import os
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -18,16 +19,25 @@ PATIENCE_S = 30.0
 
 def descendants(pid: int) -> list[int]:
     """Processes that a process started, and those that they started."""
-    found = []
-    for task in Path(f"/proc/{pid}/task").iterdir():
-        for child in (task / "children").read_text().split():
-            found += [int(child), *descendants(int(child))]
+    found: list[int] = []
+    # A process or a thread may end while it is looked at.
+    with suppress(FileNotFoundError, ProcessLookupError):
+        for task in Path(f"/proc/{pid}/task").iterdir():
+            with suppress(FileNotFoundError, ProcessLookupError):
+                for child in (task / "children").read_text().split():
+                    found += [int(child), *descendants(int(child))]
     return found
 
 
 def sockets_of(pids: list[int]) -> set[str]:
     """Inodes of the sockets that processes hold open."""
-    links = [str(fd.readlink()) for pid in pids for fd in Path(f"/proc/{pid}/fd").iterdir()]
+    links = []
+    for pid in pids:
+        # A running process closes files, and may end, while it is looked at.
+        with suppress(FileNotFoundError):
+            for fd in Path(f"/proc/{pid}/fd").iterdir():
+                with suppress(FileNotFoundError):
+                    links.append(str(fd.readlink()))
     return {link[8:-1] for link in links if link.startswith("socket:[")}
 
 
