@@ -18,7 +18,7 @@ PY      := .venv/bin/python
 
 # Without MESH_DIR, the goals that make a dataset take the embedded objects, and
 # those that use one (train, eval, ...) stay with the meshes it was made from.
-ifeq (,$(filter dataset objects scenes grasps shards bench holdout,$(MAKECMDGOALS)))
+ifeq (,$(filter dataset objects scenes grasps shards bench holdout,$(MAKECMDGOALS) $(GOAL)))
 MESH_DIR := $(or $(MESH_DIR),$(shell cat $(STATE)/mesh_dir 2>/dev/null))
 endif
 export RUN MESH_DIR WORKERS
@@ -29,21 +29,21 @@ ifeq (,$(strip $(WORKERS)))
 unexport WORKERS
 endif
 
-.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee holdout folds release review report export predict real calibrate live docs lint fuzz regress clean FORCE
+.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee holdout folds release review report export predict real calibrate live docs lint fuzz regress plan list prune seal unseal clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
 	@echo "  RUN=ci|default|paper, MESH_DIR=folder of meshes, WORKERS=processes"
 
 dataset: $(R)/shards.mcap  ## objects, scenes, grasps, shards
-	@$(PY) -m stages.graph fresh shards
+	@$(PY) -m stages.freshness fresh shards
 train: $(R)/train.mcap  ## GA-CNN on the dataset
-	@$(PY) -m stages.graph fresh train
+	@$(PY) -m stages.freshness fresh train
 eval: $(R)/evaluate.mcap  ## closed-loop success by level
 	@$(PY) -m stages.evaluate --table
 
 sweep: $(R)/sweep.mcap  ## the GA-CNN family compared (Fig. 1), and what its parts buy
-	@$(PY) -m stages.graph fresh sweep
+	@$(PY) -m stages.freshness fresh sweep
 
 objects: $(R)/objects.mcap  ## stage 1: meshes to catalogue
 scenes: $(R)/scenes.mcap  ## stage 2: clutter, settled and rendered
@@ -63,7 +63,7 @@ endif
 
 # A key file is looked at every time and rewritten only when its digest changed.
 $(STATE)/%.key: .venv/.ready FORCE
-	@$(PY) -m stages.graph key $*
+	@GOALS="$(MAKECMDGOALS)" $(PY) -m stages.freshness key $*
 $(STATE)/scenes.key: $(R)/objects.mcap
 $(STATE)/grasps.key: $(R)/scenes.mcap
 $(STATE)/shards.key: $(R)/grasps.mcap
@@ -74,7 +74,20 @@ $(STATE)/sweep.key: $(R)/shards.mcap
 FORCE:
 
 status: .venv/.ready  ## what is stale, and why
-	@$(PY) -m stages.graph status
+	@$(PY) -m stages.freshness status
+
+plan: .venv/.ready  ## what 'make GOAL' will do, about how long and how much disk: GOAL=dataset|train|eval
+	@$(PY) -m stages.freshness plan $(or $(GOAL),eval)
+
+# --- many runs ---
+list: .venv/.ready  ## every run: disk, stages, headline figures, stale or not, what it was made from
+	@$(PY) -m stages.runs list
+prune: .venv/.ready  ## what can be made again, of all runs; FREE=1 deletes it
+	@$(PY) -m stages.runs prune $(if $(FREE),--free)
+seal: .venv/.ready  ## finish RUN: nothing in it is made anew, here or on another machine
+	@$(PY) -m stages.runs seal
+unseal: .venv/.ready  ## take the seal off RUN
+	@$(PY) -m stages.runs unseal
 
 # --- the machine ---
 setup: .venv/.ready  ## virtual environment, pinned packages, Vulkan driver

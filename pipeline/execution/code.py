@@ -22,6 +22,7 @@ RUNNING = (
     "pipeline.execution.packages",
     "pipeline.execution.renderer",
     "pipeline.execution.running",
+    "pipeline.execution.sealing",
     "pipeline.execution.staleness",
     "pipeline.progress",
     "pipeline.stopwatch",

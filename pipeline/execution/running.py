@@ -21,6 +21,7 @@ from pipeline.artifacts.publishing import CANNOT_WRITE, remove_abandoned_scratch
 from pipeline.errors import SoftgripError
 from pipeline.execution.commands import EXIT_FAILURE, log_to
 from pipeline.execution.executors import Executor
+from pipeline.execution.sealing import refuse_sealed
 from pipeline.execution.stage import RunFolder, Stage, StageContext
 from pipeline.execution.staleness import (
     MEMO,
@@ -87,6 +88,7 @@ def stage_command(
                 if force or not artifact_is_fresh(context):
                     build(context)
                 return
+            refuse_sealed(folder)
             with _exclusive(folder, stage):
                 run_stage(context, build, force, draw)
 

@@ -105,7 +105,7 @@ def test_another_machine_makes_stale_and_is_told(
 def test_status_tells_each_stage(folder: RunFolder) -> None:
     def told() -> list[str]:
         done = subprocess.run(
-            [sys.executable, "-m", "stages.graph", "status", "--run", folder.path.name],
+            [sys.executable, "-m", "stages.freshness", "status", "--run", folder.path.name],
             cwd=folder.path.parent.parent,
             env={"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin"},
             capture_output=True,

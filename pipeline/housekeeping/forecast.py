@@ -1,0 +1,224 @@
+"""About how long a make will take and how much disk, from what the same stages took before."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pipeline.config import RunConfig
+from pipeline.execution.running import read_summary
+from pipeline.execution.stage import RunFolder
+from pipeline.housekeeping.listing import as_table, disk_use_bytes, size_in_words
+
+MINUTE_S, HOUR_S = 60.0, 3600.0  # an hour has 60 minutes of 60 seconds
+
+
+@dataclass(frozen=True)
+class Taken:
+    """What a stage took in a run, and how much work it was.
+
+    Attributes
+    ----------
+    run
+        Name of the run.
+    units
+        How much work [units of `work_of`].
+    wall_time_s
+        Wall time [s].
+    size_bytes
+        Artifact, shards and recording [bytes].
+    """
+
+    run: str
+    units: float
+    wall_time_s: float
+    size_bytes: int
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What one stage will do.
+
+    Attributes
+    ----------
+    stage
+        Its name.
+    reason
+        Why it is made.
+    wall_time_s
+        About how long [s]; None where no run tells.
+    size_bytes
+        About how much disk [bytes]; None where no run tells.
+    told_by
+        The run whose figures were scaled; empty where none tells.
+    """
+
+    stage: str
+    reason: str
+    wall_time_s: float | None = None
+    size_bytes: float | None = None
+    told_by: str = ""
+
+
+def work_of(stage: str, config: RunConfig, sources: int) -> float:
+    """How much work a stage will be, by its configuration.
+
+    Parameters
+    ----------
+    stage
+        Name of the stage.
+    config
+        The run's configuration.
+    sources
+        Meshes and embedded objects that stage objects reads.
+
+    Returns
+    -------
+    Objects [objects], clutters [scenes], grasps or samples [grasps, shards], samples times epochs
+    [train], clutters times policies [evaluate].
+    """
+    per_level = config.scenes.clutters_per_level
+    clutters = {split: getattr(per_level, split) for split in config.scenes.splits}
+    levels = len(config.scenes.levels)
+    if stage == "objects":
+        trained = 1 - config.split.val_fraction - config.split.test_fraction
+        return sources * (1 + trained * config.objects.stretched_copies)
+    if stage == "scenes":
+        return float(levels * sum(clutters.values()))
+    if stage == "train":
+        return float(config.grasps.count * config.train.epochs)
+    if stage == "evaluate":
+        picked = clutters.get(config.evaluate.split, 0)
+        return float(levels * picked * len(config.evaluate.policies))
+    return float(config.grasps.count)
+
+
+def work_done(stage: str, summary: dict[str, Any]) -> float:
+    """How much work a stage was, by its summary; in the units of `work_of`, 0 where untold."""
+    if stage in ("objects", "scenes", "grasps"):
+        return float(summary.get(stage, 0))
+    samples = float(sum(_counts(summary.get("samples"))))
+    if stage == "shards":
+        return samples
+    if stage == "train":
+        return samples * float(summary.get("epochs", 0))
+    by_policy = summary.get("policies", {})
+    return float(sum(found.get("clutters", 0) for found in by_policy.values()))
+
+
+def _counts(value: object) -> list[float]:
+    """The numbers within a summary's entry, whatever it is grouped by."""
+    if isinstance(value, dict):
+        return [number for inner in value.values() for number in _counts(inner)]
+    return [float(value)] if isinstance(value, int | float) else []
+
+
+def taken_by(folder: RunFolder, stage: str, config: RunConfig) -> Taken | None:
+    """What a stage took in a run; None where it was not made, or by another kind of network.
+
+    Parameters
+    ----------
+    folder
+        The run that may tell.
+    stage
+        Name of the stage.
+    config
+        Configuration of the run to be made: one network takes many times as long as another.
+
+    Returns
+    -------
+    Work, time and disk.
+    """
+    summary = read_summary(folder, stage)
+    units = work_done(stage, summary) if summary else 0.0
+    if units <= 0 or not folder.artifact(stage).is_file():
+        return None
+    if stage == "train" and (
+        summary.get("layers") != config.network.layers
+        or summary.get("channels") != list(config.network.channels)
+    ):
+        return None
+    files = (folder.artifact(stage), folder.shards(stage), folder.recording(stage))
+    size = sum(map(disk_use_bytes, files))
+    return Taken(folder.path.name, units, float(summary["wall_time_s"]), size)
+
+
+def forecast(
+    stage: str, reason: str, config: RunConfig, sources: int, others: Sequence[RunFolder]
+) -> Forecast:
+    """Scale what the run of most equal work took.
+
+    Parameters
+    ----------
+    stage
+        Name of the stage.
+    reason
+        Why it is made.
+    config
+        The run's configuration.
+    sources
+        Meshes and embedded objects that stage objects reads.
+    others
+        Runs that may tell; the run itself, made earlier, among them.
+
+    Returns
+    -------
+    Time and disk, proportional to the work; none where no run tells.
+    """
+    units = work_of(stage, config, sources)
+    told = [taken for folder in others if (taken := taken_by(folder, stage, config))]
+    if not told or units <= 0:
+        return Forecast(stage, reason)
+    nearest = min(told, key=lambda taken: abs(math.log(taken.units / units)))
+    share = units / nearest.units
+    return Forecast(
+        stage, reason, nearest.wall_time_s * share, nearest.size_bytes * share, nearest.run
+    )
+
+
+def duration_in_words(seconds: float) -> str:
+    """A duration as «40 s», «12 min» or «3.5 h»."""
+    if seconds < 2 * MINUTE_S:
+        return f"{seconds:.0f} s"
+    if seconds < 2 * HOUR_S:
+        return f"{seconds / MINUTE_S:.0f} min"
+    return f"{seconds / HOUR_S:.1f} h"
+
+
+def as_lines(forecasts: Sequence[Forecast], free_bytes: int) -> list[str]:
+    """Say what a make will do: a line a stage, the sum, and whether the disk is large enough.
+
+    Parameters
+    ----------
+    forecasts
+        The stages that are made.
+    free_bytes
+        Free disk [bytes].
+
+    Returns
+    -------
+    Lines to read; one alone where nothing is made.
+    """
+    if not forecasts:
+        return ["nothing to make: all is up to date"]
+    rows = [["stage", "why", "about", "disk", "told by"]]
+    for one in forecasts:
+        time = "not known" if one.wall_time_s is None else duration_in_words(one.wall_time_s)
+        disk = "not known" if one.size_bytes is None else size_in_words(one.size_bytes)
+        told = f"run {one.told_by}" if one.told_by else "no run yet"
+        rows.append([one.stage, one.reason, time, disk, told])
+    time_s, size = total_s(forecasts), sum(one.size_bytes or 0.0 for one in forecasts)
+    at_least = "" if all(one.told_by for one in forecasts) else "at least "
+    lines = as_table(rows).splitlines()
+    lines.append(
+        f"in all {at_least}about {duration_in_words(time_s)} and {size_in_words(size)}; "
+        f"{size_in_words(free_bytes)} of disk are free"
+    )
+    if size > free_bytes:
+        lines.append("The disk is too small: free some ('make prune' shows what can go)")
+    return lines
+
+
+def total_s(forecasts: Sequence[Forecast]) -> float:
+    """Wall time of all stages whose time is known [s]."""
+    return sum(one.wall_time_s or 0.0 for one in forecasts)
