@@ -72,6 +72,8 @@ def attempt_message(
         regrasps=decision.regrasps,
         seals=decision.seals,
         carried_m_s2=decision.carried_m_s2,
+        borne_n=made.borne_n,
+        weight_n=made.weight_n,
         pictures=[picture_message(picture) for picture in decision.pictures],
         **{name: to_tensor(np.asarray(array, np.float64)) for name, array in arrays.items()},
     )

@@ -255,7 +255,8 @@ def _facts(made: Attempt) -> str:
         f"target {made.target or 'none'}; {made.candidates} candidates, "
         f"{made.corrections} corrections, {made.seals} seals; "
         f"predicted q {made.predicted_quality:.3f}, "
-        f"reached q {made.reached_quality:.3f}, p {made.seal_pressure:.3f}; "
+        f"reached q {made.reached_quality:.3f}, seal {made.seal_pressure:.3f}; "
+        f"bears {made.borne_n:.2f} N, weighs {made.weight_n:.2f} N; "
         f"lifted {1e3 * made.lifted_height_m:.0f} mm in {made.duration_s:.1f} s, "
         f"carried at up to {made.carried_m_s2:g} m/s²\n"
     )

@@ -23,6 +23,7 @@ from pipeline.labelling.poses import label_poses
 from pipeline.physics.engine import Body
 from pipeline.simulation.floating import Mover
 from pipeline.simulation.judges import build_judge
+from pipeline.simulation.payload import loads_of_a_kilogram, way_inwards, weight_borne_n
 from pipeline.simulation.suction_joint import SuctionJoint
 from pipeline.world.posed_bodies import PosedBodies, PosedScene
 
@@ -122,8 +123,8 @@ class SuctionGripper:
         self._speed_m_s = 0.0
         self._follows = True
         self._state = State.OBSERVE
-        self.target = 0
-        self.reached_quality = self.seal_pressure = 0.0
+        self.target, self.sealed = 0, False
+        self.reached_quality = self.seal_pressure = self.borne_n = 0.0
         self.reached_pose = np.eye(4)
         self.time_s = 0.0
         self.samples: list[Sample] = []
@@ -184,7 +185,8 @@ class SuctionGripper:
             self._joint = None
             return
         self.reached_pose = pose = self.pose()
-        self.target, self.reached_quality, self.seal_pressure = 0, 0.0, 0.0
+        self.target, self.sealed = 0, False
+        self.reached_quality = self.seal_pressure = self.borne_n = 0.0
         found = self._judge.find_seal(pose, self.surfaces())
         if found is None or found[1].pressure <= 0.0:
             return
@@ -193,6 +195,10 @@ class SuctionGripper:
         self.reached_quality = self._quality_at(pose, self.target)
         if bearing.closes:
             body, item = self._bodies[self.target], self._objects[self.target]
+            centre_m = body.world_from_object[:3, 3]
+            self.borne_n = weight_borne_n(bearing, pose, centre_m, self._config.evaluate)
+            still = loads_of_a_kilogram(pose, centre_m, np.zeros((1, 3)))[0]
+            self.sealed = bearing.seals(item.mass_kg * still)
             self._joint = SuctionJoint.close(body, item, bearing, pose)
 
     def shake(self) -> Reading:
@@ -236,10 +242,8 @@ class SuctionGripper:
 
     def _way_aside_m(self) -> Float[np.ndarray, " 3"]:
         """A level way that the mover can go, as long as the configuration's where possible."""
-        place, way_m = self._goal[:3, 3], self._config.evaluate.transport.way_m
-        inwards = -place * [1.0, 1.0, 0.0]
-        far = float(np.linalg.norm(inwards))
-        ways = [inwards / far] if far > _ARRIVED_M else []
+        way_m = self._config.evaluate.transport.way_m
+        ways = [way_inwards(self._goal[:3, 3])]
         ways += [
             np.array([x, y, 0.0]) for x, y in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
         ]

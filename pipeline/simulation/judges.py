@@ -30,6 +30,32 @@ class Bearing(Protocol):
     def closes(self) -> bool:
         """Whether the seal can hold anything, so that a joint is made."""
 
+    def seals(self, at_rest: Float[np.ndarray, " 6"]) -> bool:
+        """Whether the seal holds an object that hangs still: a later loss is then the lift's.
+
+        Parameters
+        ----------
+        at_rest
+            Load of the object's weight alone, as in `bears`, shape (6,).
+
+        Returns
+        -------
+        False where there is no seal worth the name.
+        """
+
+    def largest_scale(self, loads: Float[np.ndarray, "n 6"]) -> float:
+        """How many times each of several loads the seal bears, each by itself.
+
+        Parameters
+        ----------
+        loads
+            As in `bears`, a load a row, shape (n, 6).
+
+        Returns
+        -------
+        The largest factor, ≥ 0.
+        """
+
     def bears(self, load: Float[np.ndarray, " 6"]) -> bool:
         """Whether the seal holds a load.
 
@@ -110,6 +136,14 @@ class RefereeBearing:
     def closes(self) -> bool:
         """Whether the seal pulls at all; each load then decides whether it holds."""
         return self.seal.pull_n > 0.0
+
+    def seals(self, at_rest: Float[np.ndarray, " 6"]) -> bool:
+        """See `Bearing.seals`; whether the weight is balanced."""
+        return self.bears(at_rest)
+
+    def largest_scale(self, loads: Float[np.ndarray, "n 6"]) -> float:
+        """See `Bearing.largest_scale`."""
+        return self.seal.hold.largest_common_scale(loads)
 
     def bears(self, load: Float[np.ndarray, " 6"]) -> bool:
         """See `Bearing.bears`; contact pressure and friction must balance load and pull."""

@@ -19,6 +19,7 @@ from pipeline.simulation.arm import ArmMover
 from pipeline.simulation.eyes import SimulatedEyes
 from pipeline.simulation.floating import FloatingMover, Mover
 from pipeline.simulation.gripper_body import Sample, SuctionGripper
+from pipeline.simulation.payload import GRAVITY_M_S2
 from pipeline.world.scene import ClutterScene
 
 _COLOUR = (0.5, 0.5, 0.5)  # no picture is rendered in this world
@@ -41,6 +42,11 @@ class JudgedAttempt:
         q of Algorithm 1 on the true surfaces at the pose reached.
     seal_pressure
         Quality of the seal as the judge found it, in [0, 1].
+    borne_n
+        Largest weight at the object's centre of mass that the last seal bears through lift, shake
+        and transport, as the judge finds it [N].
+    weight_n
+        Weight of the object under the pad [N]; 0 where there is none.
     lifted_height_m
         Height of the object above where it was sealed, at the end [m].
     duration_s
@@ -56,6 +62,8 @@ class JudgedAttempt:
     target: str
     reached_quality: float
     seal_pressure: float
+    borne_n: float
+    weight_n: float
     lifted_height_m: float
     duration_s: float
     reached_pose: Float[np.ndarray, "4 4"]
@@ -190,10 +198,7 @@ class Clutter:
         height = gripper.lifted_m()
         if cause is Cause.LIFTED and height < self._config.evaluate.lift.height_m:
             cause = Cause.LOST_IN_SHAKE
-        if (
-            cause is Cause.NO_SEAL
-            and gripper.seal_pressure >= self._config.evaluate.suction.seal_min
-        ):
+        if cause is Cause.NO_SEAL and gripper.sealed:
             cause = Cause.LOST_IN_LIFT  # the seal was made and broke at the start of the lift
         if cause is not Cause.LIFTED and gripper.target in self._off_the_table():
             cause = Cause.OFF_THE_TABLE
@@ -203,6 +208,8 @@ class Clutter:
             target=self.items[gripper.target].name if gripper.target else "",
             reached_quality=gripper.reached_quality,
             seal_pressure=gripper.seal_pressure,
+            borne_n=gripper.borne_n,
+            weight_n=GRAVITY_M_S2 * self.items[gripper.target].mass_kg if gripper.target else 0.0,
             lifted_height_m=height,
             duration_s=gripper.time_s,
             reached_pose=gripper.reached_pose,

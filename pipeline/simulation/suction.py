@@ -52,6 +52,34 @@ class SealLimits:
         """Whether p is enough to close the joint."""
         return self.pressure > 0.0 and self.pressure >= self.seal_min
 
+    def seals(self, at_rest: Float[np.ndarray, " 6"]) -> bool:
+        """Whether p is enough, whatever hangs on the pad."""
+        return self.closes
+
+    def largest_scale(self, loads: Float[np.ndarray, "n 6"]) -> float:
+        """How many times each of several loads is within every limit.
+
+        Parameters
+        ----------
+        loads
+            As in `bears`, a load a row, shape (n, 6).
+
+        Returns
+        -------
+        The largest factor that all of them may be multiplied with; inf where no load pulls.
+        """
+        asked = np.column_stack(
+            [
+                np.maximum(-loads[:, 2], 0.0),
+                np.abs(loads[:, :2]).max(axis=1),
+                np.abs(loads[:, 5]),
+                np.hypot(loads[:, 3], loads[:, 4]),
+            ]
+        )
+        borne = np.array([self.pull_n, self.side_n, self.torsion_nm, self.peel_nm])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return float(np.where(asked > 0.0, borne / asked, np.inf).min())
+
     def bears(self, load: Float[np.ndarray, " 6"]) -> bool:
         """Whether a load is within every limit.
 

@@ -58,3 +58,12 @@ LIMITS = SealLimits(pressure=1.0, pull_n=10.0, side_n=3.0, torsion_nm=0.05, peel
 )
 def test_each_limit_breaks_on_its_own(load: tuple[float, ...], broken: bool) -> None:
     assert LIMITS.bears(np.array(load, dtype=float)) is not broken
+
+
+def test_the_largest_scale_is_where_the_first_limit_breaks() -> None:
+    loads = np.array([[0, 0, -1.0, 0, 0, 0], [0.5, 0, -1.0, 0.01, 0, 0], [0, 0, 5.0, 0, 0, 0]])
+    scale = LIMITS.largest_scale(loads)
+    assert scale == pytest.approx(6.0)  # 3 N of side force over 0.5 N
+    assert all(LIMITS.bears(0.999 * scale * load) for load in loads)
+    assert not all(LIMITS.bears(1.001 * scale * load) for load in loads)
+    assert LIMITS.largest_scale(loads[2:]) == np.inf

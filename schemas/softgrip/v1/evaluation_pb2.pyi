@@ -8,7 +8,7 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class Attempt(_message.Message):
-    __slots__ = ("scene_id", "level", "attempt", "outcome", "cause", "target", "candidates", "predicted_quality", "reached_quality", "seal_pressure", "lifted_height_m", "duration_s", "world_from_gripper", "reached_pose", "time_s", "gripper_path", "object_paths", "base_wrench", "states", "policy", "candidate_poses", "candidate_quality", "corrections", "pictures", "regrasps", "joint_path", "seals", "carried_m_s2")
+    __slots__ = ("scene_id", "level", "attempt", "outcome", "cause", "target", "candidates", "predicted_quality", "reached_quality", "seal_pressure", "lifted_height_m", "duration_s", "world_from_gripper", "reached_pose", "time_s", "gripper_path", "object_paths", "base_wrench", "states", "policy", "candidate_poses", "candidate_quality", "corrections", "pictures", "regrasps", "joint_path", "seals", "carried_m_s2", "borne_n", "weight_n")
     SCENE_ID_FIELD_NUMBER: _ClassVar[int]
     LEVEL_FIELD_NUMBER: _ClassVar[int]
     ATTEMPT_FIELD_NUMBER: _ClassVar[int]
@@ -37,6 +37,8 @@ class Attempt(_message.Message):
     JOINT_PATH_FIELD_NUMBER: _ClassVar[int]
     SEALS_FIELD_NUMBER: _ClassVar[int]
     CARRIED_M_S2_FIELD_NUMBER: _ClassVar[int]
+    BORNE_N_FIELD_NUMBER: _ClassVar[int]
+    WEIGHT_N_FIELD_NUMBER: _ClassVar[int]
     scene_id: str
     level: int
     attempt: int
@@ -65,7 +67,9 @@ class Attempt(_message.Message):
     joint_path: _tensor_pb2.Tensor
     seals: int
     carried_m_s2: float
-    def __init__(self, scene_id: _Optional[str] = ..., level: _Optional[int] = ..., attempt: _Optional[int] = ..., outcome: _Optional[str] = ..., cause: _Optional[str] = ..., target: _Optional[str] = ..., candidates: _Optional[int] = ..., predicted_quality: _Optional[float] = ..., reached_quality: _Optional[float] = ..., seal_pressure: _Optional[float] = ..., lifted_height_m: _Optional[float] = ..., duration_s: _Optional[float] = ..., world_from_gripper: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., reached_pose: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., time_s: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., gripper_path: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., object_paths: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., base_wrench: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., states: _Optional[_Iterable[str]] = ..., policy: _Optional[str] = ..., candidate_poses: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., candidate_quality: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., corrections: _Optional[int] = ..., pictures: _Optional[_Iterable[_Union[DepthPicture, _Mapping]]] = ..., regrasps: _Optional[int] = ..., joint_path: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., seals: _Optional[int] = ..., carried_m_s2: _Optional[float] = ...) -> None: ...
+    borne_n: float
+    weight_n: float
+    def __init__(self, scene_id: _Optional[str] = ..., level: _Optional[int] = ..., attempt: _Optional[int] = ..., outcome: _Optional[str] = ..., cause: _Optional[str] = ..., target: _Optional[str] = ..., candidates: _Optional[int] = ..., predicted_quality: _Optional[float] = ..., reached_quality: _Optional[float] = ..., seal_pressure: _Optional[float] = ..., lifted_height_m: _Optional[float] = ..., duration_s: _Optional[float] = ..., world_from_gripper: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., reached_pose: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., time_s: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., gripper_path: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., object_paths: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., base_wrench: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., states: _Optional[_Iterable[str]] = ..., policy: _Optional[str] = ..., candidate_poses: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., candidate_quality: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., corrections: _Optional[int] = ..., pictures: _Optional[_Iterable[_Union[DepthPicture, _Mapping]]] = ..., regrasps: _Optional[int] = ..., joint_path: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., seals: _Optional[int] = ..., carried_m_s2: _Optional[float] = ..., borne_n: _Optional[float] = ..., weight_n: _Optional[float] = ...) -> None: ...
 
 class DepthPicture(_message.Message):
     __slots__ = ("camera", "depth_mm", "intrinsics", "world_from_camera")
