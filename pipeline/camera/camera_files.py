@@ -15,6 +15,7 @@ import yaml
 from jaxtyping import Float
 
 from pipeline.errors import PictureError
+from pipeline.world.cameras import PIXEL_CENTRE_PX
 
 LAYOUTS = (
     "a 3x3 matrix under 'intrinsics', 'camera_matrix', 'K', 'k', 'cam_K' or 'intrinsic_matrix', "
@@ -25,7 +26,6 @@ RIGID_TOLERANCE = 1e-3  # poses in files are often rounded to four digits
 # picture is not one of a pinhole. Less is under the size of a cell of a sub cloud.
 DISTORTED_PX = 1.0
 FISHEYE_MODELS = ("equidistant", "fisheye", "kannala_brandt4")
-_PIXEL_CENTRE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +117,7 @@ def camera_of(content: Any, source: str) -> CameraFile:
     size = _size(content, source)
     _check_distortion(content, k, size, source)
     shifted = k.copy()
-    shifted[:2, 2] += _PIXEL_CENTRE
+    shifted[:2, 2] += PIXEL_CENTRE_PX
     return CameraFile(shifted, size, _pose(content, source), _scale(content, source))
 
 

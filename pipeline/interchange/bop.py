@@ -22,7 +22,7 @@ from scipy.spatial.distance import pdist
 from pipeline.artifacts.publishing import publish_bytes
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.transforms import invert
-from pipeline.world.cameras import PinholeCamera, pixel_rays, project
+from pipeline.world.cameras import PIXEL_CENTRE_PX, PinholeCamera, pixel_rays, project
 from pipeline.world.raycasting import RayScene
 from pipeline.world.scene import ClutterScene, PlacedObject
 from pipeline.world.view import CameraView
@@ -202,7 +202,7 @@ def _write_pictures(
 
 def _camera(camera: PinholeCamera) -> dict[str, Any]:
     k = camera.intrinsics.copy()
-    k[:2, 2] -= 0.5
+    k[:2, 2] -= PIXEL_CENTRE_PX
     camera_from_world = invert(camera.world_from_camera)
     return {
         "cam_K": k.ravel().tolist(),

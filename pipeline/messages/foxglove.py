@@ -12,7 +12,7 @@ from google.protobuf.timestamp_pb2 import Timestamp
 from jaxtyping import Float
 
 from pipeline.geometry.transforms import position_quaternion
-from pipeline.world.cameras import PinholeCamera
+from pipeline.world.cameras import PIXEL_CENTRE_PX, PinholeCamera
 
 WORLD_FRAME = "world"
 
@@ -52,14 +52,31 @@ def raw_image(
 
 
 def camera_calibration(camera: PinholeCamera, time_ns: int) -> CameraCalibration:
-    """The intrinsics of a camera without distortion."""
-    projection = np.hstack([camera.intrinsics, np.zeros((3, 1))])
+    """The intrinsics of a camera without distortion, with ROS's pixel centres.
+
+    ROS and Foxglove put the centre of the first pixel at (0, 0), the project at (0.5, 0.5): the
+    same ray has a principal point smaller by `PIXEL_CENTRE_PX` here.
+
+    Parameters
+    ----------
+    camera
+        What took the picture.
+    time_ns
+        When, in simulated or recorded time.
+
+    Returns
+    -------
+    The message.
+    """
+    k = camera.intrinsics.copy()
+    k[:2, 2] -= PIXEL_CENTRE_PX
+    projection = np.hstack([k, np.zeros((3, 1))])
     return CameraCalibration(
         timestamp=stamp(time_ns),
         frame_id=camera.name,
         width=camera.width_px,
         height=camera.height_px,
-        K=camera.intrinsics.ravel().tolist(),
+        K=k.ravel().tolist(),
         R=np.eye(3).ravel().tolist(),
         P=projection.ravel().tolist(),
     )

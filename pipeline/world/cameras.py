@@ -17,6 +17,9 @@ from pipeline.config.cameras import (
 from pipeline.geometry.transforms import invert, look_at, rotate_vectors, transform_points
 from pipeline.read_only import read_only
 
+PIXEL_CENTRE_PX = 0.5
+"""Column and row of the first pixel's centre. OpenCV, ROS and the datasets call it 0, so their
+principal points are smaller by this."""
 _TARGET_M = np.array([0.0, 0.0, 0.02])  # a little above the middle of the table
 
 
@@ -209,8 +212,8 @@ def pixel_slopes(
     """
     k = intrinsics
     return (
-        (np.arange(shape[1]) + 0.5 - k[0, 2]) / k[0, 0],
-        (np.arange(shape[0]) + 0.5 - k[1, 2]) / k[1, 1],
+        (np.arange(shape[1]) + PIXEL_CENTRE_PX - k[0, 2]) / k[0, 0],
+        (np.arange(shape[0]) + PIXEL_CENTRE_PX - k[1, 2]) / k[1, 1],
     )
 
 
@@ -390,7 +393,7 @@ def thinned(camera: PinholeCamera, every: int) -> PinholeCamera:
     """
     intrinsics = camera.intrinsics.copy()
     intrinsics[:2, :2] /= every
-    intrinsics[:2, 2] = (intrinsics[:2, 2] - 0.5) / every + 0.5
+    intrinsics[:2, 2] = (intrinsics[:2, 2] - PIXEL_CENTRE_PX) / every + PIXEL_CENTRE_PX
     return replace(
         camera,
         width_px=-(-camera.width_px // every),
