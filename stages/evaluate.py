@@ -106,7 +106,14 @@ def pick_clutter(job: ClutterJob) -> Path:
     with ArtifactWriter(job.path, job.provenance) as artifact:
         for number, attempt in enumerate(made):
             message = attempt_message(
-                scene.scene_id, scene.level, len(scene.objects), number, job.policy, attempt
+                scene.scene_id,
+                scene.level,
+                len(scene.objects),
+                number,
+                job.policy,
+                job.config.evaluate.judge,
+                attempt,
+                job.config,
             )
             artifact.write("/attempts", message, log_time_ns=number)
     return job.path

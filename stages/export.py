@@ -16,9 +16,8 @@ from pipeline.config.evaluation import PolicyName
 from pipeline.errors import ArtifactError, MachineError
 from pipeline.execution import RunFolder, progress, run_command
 from pipeline.interchange.graspgen import write_graspgen, write_lists
-from pipeline.interchange.lerobot import write_lerobot
 from pipeline.interchange.parquet_shards import write_parquet
-from pipeline.interchange.reading import grasps_by_object, read_episodes, read_shard
+from pipeline.interchange.reading import grasps_by_object, read_shard
 from pipeline.interchange.scene_exports import export_bop, export_usd
 from pipeline.network.samples import SPLITS
 from stages.graph import RUNS_DIR
@@ -97,7 +96,7 @@ def export_run(folder: RunFolder, wanted: Format, least_quality: float) -> Path:
         elif wanted in (Format.BOP, Format.USD):
             count = export_scenes(folder, into, wanted)
         elif wanted is Format.LEROBOT:
-            count = write_lerobot(into, read_episodes(source, CLOSED_LOOP))
+            count = export_episodes(folder, source, into)
         else:
             count = export_samples(source, into, wanted)
     except ModuleNotFoundError as error:
@@ -144,6 +143,15 @@ def export_scenes(folder: RunFolder, into: Path, wanted: Format) -> int:
     config = load_run_config(folder.config)
     radius_m, side_m = config.gripper.pad.radius_m, config.scenes.table_side_m
     return export_usd(objects, scenes, folder.artifact("grasps"), into, radius_m, side_m)
+
+
+def export_episodes(folder: RunFolder, source: Path, into: Path) -> int:
+    """An episode an attempt of the closed loop; how many frames."""
+    from pipeline.interchange.episodes import read_episodes  # PyAV is an extra
+    from pipeline.interchange.lerobot import write_lerobot
+
+    fps = round(load_run_config(folder.config).evaluate.policy.rate_hz)
+    return write_lerobot(into, read_episodes(source, CLOSED_LOOP), fps)
 
 
 def export_samples(source: Path, into: Path, wanted: Format) -> int:

@@ -149,6 +149,12 @@ class EvaluateConfig(Section):
         15, ge=1, description="attempts before a clutter is given up as not cleared"
     )
     failures_per_clutter: int = Field(5, ge=1, description="failures in a row that end a clutter")
+    seen_every: int = Field(
+        2,
+        ge=1,
+        le=16,
+        description="of the pictures that attempts keep, one pixel of so many on each side",
+    )
     suction: SuctionConfig = SuctionConfig()
     lift: LiftConfig = LiftConfig()
     transport: TransportConfig = TransportConfig()

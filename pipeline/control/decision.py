@@ -57,6 +57,28 @@ class Strategy:
     feels: bool
 
 
+@dataclass(frozen=True, eq=False)
+class TriedContact:
+    """A contact at which the vacuum was switched on.
+
+    Attributes
+    ----------
+    world_from_contact
+        The contact as it was aimed at, shape (4, 4).
+    quality
+        Its q-hat.
+    pictures
+        Depth images by which it was aimed at.
+    held
+        Whether an object hung on the pad after the first tug.
+    """
+
+    world_from_contact: Float[np.ndarray, "4 4"]
+    quality: float
+    pictures: list[DepthPicture]
+    held: bool
+
+
 @dataclass(eq=False)
 class Decision:
     """What the policy decided in one attempt; the attempt fills it in as it goes.
@@ -85,6 +107,11 @@ class Decision:
         Contacts in WCS that did not hold in the first tug [m], each of shape (3,).
     pictures
         Depth images that the last choice was made from.
+    aimed_by
+        Depth images by which the contact aimed at last was found: those of the choice, or the
+        one that corrected it.
+    tried
+        Every contact at which the vacuum was switched on, in order.
     """
 
     cause: Cause = Cause.EMPTY_CLOUD
@@ -98,3 +125,5 @@ class Decision:
     carried_m_s2: float = 0.0
     failed_contacts_m: list[Float[np.ndarray, " 3"]] = field(default_factory=list)
     pictures: list[DepthPicture] = field(default_factory=list)
+    aimed_by: list[DepthPicture] = field(default_factory=list)
+    tried: list[TriedContact] = field(default_factory=list)

@@ -20,7 +20,8 @@ import numpy as np
 from jaxtyping import Float
 
 from pipeline.config.evaluation import EvaluateConfig
-from pipeline.control.decision import Cause, Decision, Strategy
+from pipeline.control.cloud import DepthPicture
+from pipeline.control.decision import Cause, Decision, Strategy, TriedContact
 from pipeline.control.global_phase import Choice, GlobalPhase
 from pipeline.control.local_phase import LocalPhase, way_left_m
 from pipeline.control.regrasp import load_place_m
@@ -189,7 +190,7 @@ class Attempt:
             return Cause.CAMERA_STOPPED
         found = self._local.look(picture, aim)
         if found is not None:
-            self._aim(*found)
+            self._aim(*found, [picture])
             self.decision.corrections += 1
         elif self._new_choices_left > 0:
             return self._choose_anew()
@@ -217,7 +218,9 @@ class Attempt:
         self.decision.seals += 1
         start = self._robot.pose()
         readings = self._raise(start, self._policy.tug_m)
-        if self._monitor.holds(readings[-1]):
+        held = self._monitor.holds(readings[-1])
+        self._remember_try(held)
+        if held:
             return None
         self._robot.vacuum(on=False)
         self._travel(back_off(start, self._policy.retreat_m))
@@ -229,6 +232,14 @@ class Attempt:
         self._regrasps_left -= 1
         self.decision.regrasps += 1
         return self._run_phases(*self._phases_to_seal())
+
+    def _remember_try(self, held: bool) -> None:
+        decision = self.decision
+        decision.tried.append(
+            TriedContact(
+                decision.world_from_contact, decision.predicted_quality, decision.aimed_by, held
+            )
+        )
 
     def _aim_nearer(self, felt: Reading) -> bool:
         """Aim at a contact nearer to the object's centre of mass; whether there was one."""
@@ -305,11 +316,12 @@ class Attempt:
     def _aim_at(self, choice: Choice | None) -> bool:
         if choice is None:
             return False
-        self._aim(choice.world_from_contact, choice.quality)
+        self._aim(choice.world_from_contact, choice.quality, self.decision.pictures)
         self._aim_unmeasured = choice.unmeasured
         self._local.start_over()
         return True
 
-    def _aim(self, pose: Float[np.ndarray, "4 4"], quality: float) -> None:
+    def _aim(self, pose: Float[np.ndarray, "4 4"], quality: float, by: list[DepthPicture]) -> None:
         self.decision.world_from_contact = turn_least(pose, self._robot.pose())
         self.decision.predicted_quality = float(quality)
+        self.decision.aimed_by = by

@@ -1,5 +1,6 @@
 """What the policy needs: cameras, and a robot that moves one control step at a time."""
 
+import math
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
@@ -42,6 +43,8 @@ class Reading:
         Whether the target was reached.
     followed
         False where the arm could not go on.
+    pressure
+        Vacuum at the pad over the pump's greatest, in [0, 1]; NaN where nothing measures it.
     """
 
     world_from_gripper: Float[np.ndarray, "4 4"]
@@ -49,6 +52,7 @@ class Reading:
     peak_n: float
     arrived: bool
     followed: bool = True
+    pressure: float = math.nan
 
 
 class Eyes(Protocol):

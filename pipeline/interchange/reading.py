@@ -4,8 +4,6 @@ from pathlib import Path
 
 from pipeline.artifacts import from_tensor, open_artifact
 from pipeline.artifacts.sharding import listed_shards
-from pipeline.errors import ArtifactError
-from pipeline.interchange.lerobot import Episode
 from pipeline.interchange.object_grasps import (
     ObjectGrasps,
     PlacedGrasps,
@@ -18,7 +16,6 @@ from pipeline.messages.grasps import grasps_of
 from pipeline.messages.objects import read_objects
 from pipeline.messages.samples import samples_of
 from pipeline.network.samples import Samples, join_samples
-from schemas.softgrip.v1.evaluation_pb2 import Attempt
 from schemas.softgrip.v1.grasps_pb2 import GraspBatch
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 from schemas.softgrip.v1.scenes_pb2 import Scene
@@ -85,49 +82,6 @@ def grasps_by_scene(grasps: Path) -> dict[str, PlacedGrasps]:
                 origin, found = grasps_of(message)
                 parts.setdefault(origin.scene_id, []).append(placed_grasps(found))
     return {scene: join_placed(found) for scene, found in parts.items()}
-
-
-def read_episodes(evaluate: Path, policy: str) -> list[Episode]:
-    """Every attempt of a policy, as an episode.
-
-    Parameters
-    ----------
-    evaluate
-        Artifact of stage evaluate.
-    policy
-        Its name, such as ``closed-loop``.
-
-    Returns
-    -------
-    The attempts in the order of the artifact; of several pictures of a camera the last.
-
-    Raises
-    ------
-    ArtifactError
-        The artifact is missing or damaged, or the policy made no attempt.
-    """
-    found = []
-    with open_artifact(evaluate) as artifact:
-        for _, attempt in artifact.messages(Attempt):
-            time_s = from_tensor(attempt.time_s)
-            if attempt.policy != policy or len(time_s) == 0:
-                continue
-            found.append(
-                Episode(
-                    name=f"{attempt.scene_id}, attempt {attempt.attempt}",
-                    time_s=time_s,
-                    world_from_gripper=from_tensor(attempt.gripper_path),
-                    wrench=from_tensor(attempt.base_wrench),
-                    pictures={one.camera: from_tensor(one.depth_mm) for one in attempt.pictures},
-                    success=attempt.outcome == "lifted",
-                    quality=attempt.predicted_quality,
-                )
-            )
-    if not found:
-        raise ArtifactError(
-            f"{evaluate} holds no attempt of {policy}", "Name it under evaluate.policies"
-        )
-    return found
 
 
 def read_shard(shard: Path) -> tuple[Samples, tuple[str, ...]]:

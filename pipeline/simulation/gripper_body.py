@@ -7,13 +7,13 @@ touches the true surfaces.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 import sapien
 from jaxtyping import Float
 
 from pipeline.config import RunConfig
+from pipeline.control.attempts import Sample
 from pipeline.control.robot import Reading, State
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.compiled_poses import turn_between, turned
@@ -30,34 +30,6 @@ from pipeline.world.posed_bodies import PosedBodies, PosedScene
 _ARRIVED_M, _ARRIVED_RAD = 1e-4, 1e-3  # a motion has ended: under what a camera tells apart
 _LAG_M = 0.002  # an arm that is this near has arrived
 _LEVER_M = 0.2  # a turn counts as the way of a point this far from the axis
-
-
-@dataclass(frozen=True, eq=False)
-class Sample:
-    """State of the simulation at the end of a control step.
-
-    Attributes
-    ----------
-    time_s
-        Simulated time since the attempt began [s].
-    world_from_gripper
-        Pose of the gripper, shape (4, 4).
-    world_from_object
-        Pose of each body by body id, shape (4, 4).
-    wrench
-        Force [N] and moment [N m] at the flange, in the axes of GCS, shape (6,).
-    state
-        Name of the policy's state.
-    joints_rad
-        Joint angles of the arm [rad]; empty where there is none.
-    """
-
-    time_s: float
-    world_from_gripper: Float[np.ndarray, "4 4"]
-    world_from_object: dict[int, Float[np.ndarray, "4 4"]]
-    wrench: Float[np.ndarray, " 6"]
-    state: str
-    joints_rad: Float[np.ndarray, " joints"]
 
 
 def there_and_back(leg: float) -> float:
@@ -376,7 +348,7 @@ class SuctionGripper:
         wrench = self._at_base(load)
         self._sample(wrench)
         followed, self._follows = self._follows, True
-        return Reading(self.pose(), wrench, peak_n, arrived, followed)
+        return Reading(self.pose(), wrench, peak_n, arrived, followed, self._pressure())
 
     def _at_base(self, load: Float[np.ndarray, " 6"]) -> Float[np.ndarray, " 6"]:
         """A load at the pad's centre, moved to the flange; axes stay those of GCS."""
@@ -397,7 +369,13 @@ class SuctionGripper:
         poses = {i: body.world_from_object for i, body in self._bodies.items()}
         joints = self._mover.joints_rad()
         state = str(self._state)
-        self.samples.append(Sample(self.time_s, self.pose(), poses, wrench, state, joints))
+        self.samples.append(
+            Sample(self.time_s, self.pose(), poses, wrench, state, joints, self._pressure())
+        )
+
+    def _pressure(self) -> float:
+        """What a pressure sensor would read, over the pump's greatest vacuum: 0 once it leaks."""
+        return self.seal_pressure if self._joint is not None else 0.0
 
     def _reach_m(self) -> float:
         """Height above the contact at which rays start [m]."""

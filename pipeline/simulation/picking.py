@@ -1,7 +1,6 @@
 """Emptying one clutter: one attempt after another in one SAPIEN world, each judged by physics."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 import sapien
@@ -9,6 +8,7 @@ from jaxtyping import Float
 
 from pipeline.config import RunConfig
 from pipeline.config.evaluation import PolicyName
+from pipeline.control.attempts import JudgedAttempt, LoggedEyes, SeenPicture
 from pipeline.control.decision import Cause, Decision, Strategy
 from pipeline.control.policy import Attempt
 from pipeline.control.ranking import GeometricRanking, NetworkRanking, Predict
@@ -18,56 +18,12 @@ from pipeline.physics.engine import Body, add_body, new_world
 from pipeline.simulation.arm import ArmMover
 from pipeline.simulation.eyes import SimulatedEyes
 from pipeline.simulation.floating import FloatingMover, Mover
-from pipeline.simulation.gripper_body import Sample, SuctionGripper
+from pipeline.simulation.gripper_body import SuctionGripper
 from pipeline.simulation.payload import GRAVITY_M_S2
 from pipeline.world.scene import ClutterScene
 
 _COLOUR = (0.5, 0.5, 0.5)  # no picture is rendered in this world
 _GONE_M = -0.05  # an object whose centre is lower than this has left the table
-
-
-@dataclass(frozen=True, eq=False)
-class JudgedAttempt:
-    """One attempt: what the policy decided, and what the simulation then measured.
-
-    Attributes
-    ----------
-    decision
-        The policy's decision, with its candidates and pictures.
-    cause
-        Why the attempt ended, corrected by what physics shows; `Cause.LIFTED` is a success.
-    target
-        Name of the object under the pad; empty where the vacuum met none.
-    reached_quality
-        q of Algorithm 1 on the true surfaces at the pose reached.
-    seal_pressure
-        Quality of the seal as the judge found it, in [0, 1].
-    borne_n
-        Largest weight at the object's centre of mass that the last seal bears through lift, shake
-        and transport, as the judge finds it [N].
-    weight_n
-        Weight of the object under the pad [N]; 0 where there is none.
-    lifted_height_m
-        Height of the object above where it was sealed, at the end [m].
-    duration_s
-        Simulated time [s].
-    reached_pose
-        world_from_gripper when the vacuum was switched on, shape (4, 4).
-    samples
-        State at the end of each control step.
-    """
-
-    decision: Decision
-    cause: Cause
-    target: str
-    reached_quality: float
-    seal_pressure: float
-    borne_n: float
-    weight_n: float
-    lifted_height_m: float
-    duration_s: float
-    reached_pose: Float[np.ndarray, "4 4"]
-    samples: list[Sample]
 
 
 def build_strategy(name: PolicyName, predict: Predict, config: RunConfig) -> Strategy:
@@ -173,8 +129,9 @@ class Clutter:
         The attempt and how it ended.
         """
         self.gripper.begin()
+        eyes = LoggedEyes(self.eyes, lambda: len(self.gripper.samples) - 1)
         decision = Attempt(
-            self.eyes,
+            eyes,
             self.gripper,
             strategy,
             self._config.evaluate,
@@ -182,7 +139,7 @@ class Clutter:
             self._rng,
             avoid_m,
         ).run()
-        made = self._judge(decision)
+        made = self._judge(decision, eyes.seen)
         lifted = {self.gripper.target} if made.cause is Cause.LIFTED else set()
         self.gripper.begin()
         for body_id in lifted:
@@ -192,7 +149,7 @@ class Clutter:
             self.world.remove_entity(self.bodies.pop(body_id).entity)
         return made
 
-    def _judge(self, decision: Decision) -> JudgedAttempt:
+    def _judge(self, decision: Decision, seen: list[SeenPicture]) -> JudgedAttempt:
         """Correct the policy's own verdict by what physics shows, such as a low lift."""
         gripper, cause = self.gripper, decision.cause
         height = gripper.lifted_m()
@@ -214,6 +171,7 @@ class Clutter:
             duration_s=gripper.time_s,
             reached_pose=gripper.reached_pose,
             samples=gripper.samples,
+            seen=seen,
         )
 
     def _off_the_table(self) -> set[int]:

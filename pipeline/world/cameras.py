@@ -17,9 +17,9 @@ from pipeline.config.cameras import (
 from pipeline.geometry.transforms import invert, look_at, rotate_vectors, transform_points
 from pipeline.read_only import read_only
 
+# Column and row of the first pixel's centre. OpenCV, ROS and the datasets call it 0, so their
+# principal points are smaller by this.
 PIXEL_CENTRE_PX = 0.5
-"""Column and row of the first pixel's centre. OpenCV, ROS and the datasets call it 0, so their
-principal points are smaller by this."""
 _TARGET_M = np.array([0.0, 0.0, 0.02])  # a little above the middle of the table
 
 

@@ -18,7 +18,9 @@ BALLS_M = ((0.06, -0.03, 0.05), (-0.11, 0.04, 0.02), (0.02, 0.09, 0.08))
 def test_a_ball_lies_on_the_pixels_where_ros_projects_it(at: tuple[float, float, float]) -> None:
     ball = trimesh.creation.icosphere(subdivisions=3, radius=0.012)
     ball.apply_translation(at)
-    frame = seen([Mesh(np.asarray(ball.vertices), np.asarray(ball.faces))], (0.02, -0.4, 0.5), 0, True)
+    frame = seen(
+        [Mesh(np.asarray(ball.vertices), np.asarray(ball.faces))], (0.02, -0.4, 0.5), 0, True
+    )
     rows, columns = np.nonzero(frame.depth_m)
     assert len(rows) > 50
     message = camera_calibration(frame.camera, 0)

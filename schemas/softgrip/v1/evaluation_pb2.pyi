@@ -8,7 +8,7 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class Attempt(_message.Message):
-    __slots__ = ("scene_id", "level", "attempt", "outcome", "cause", "target", "candidates", "predicted_quality", "reached_quality", "seal_pressure", "lifted_height_m", "duration_s", "world_from_gripper", "reached_pose", "time_s", "gripper_path", "object_paths", "base_wrench", "states", "policy", "candidate_poses", "candidate_quality", "corrections", "pictures", "regrasps", "joint_path", "seals", "carried_m_s2", "borne_n", "weight_n")
+    __slots__ = ("scene_id", "level", "attempt", "outcome", "cause", "target", "candidates", "predicted_quality", "reached_quality", "seal_pressure", "lifted_height_m", "duration_s", "world_from_gripper", "reached_pose", "time_s", "gripper_path", "object_paths", "base_wrench", "states", "policy", "candidate_poses", "candidate_quality", "corrections", "pictures", "regrasps", "joint_path", "seals", "carried_m_s2", "borne_n", "weight_n", "pressure", "seen", "contacts", "judge", "pad_radius_m")
     SCENE_ID_FIELD_NUMBER: _ClassVar[int]
     LEVEL_FIELD_NUMBER: _ClassVar[int]
     ATTEMPT_FIELD_NUMBER: _ClassVar[int]
@@ -39,6 +39,11 @@ class Attempt(_message.Message):
     CARRIED_M_S2_FIELD_NUMBER: _ClassVar[int]
     BORNE_N_FIELD_NUMBER: _ClassVar[int]
     WEIGHT_N_FIELD_NUMBER: _ClassVar[int]
+    PRESSURE_FIELD_NUMBER: _ClassVar[int]
+    SEEN_FIELD_NUMBER: _ClassVar[int]
+    CONTACTS_FIELD_NUMBER: _ClassVar[int]
+    JUDGE_FIELD_NUMBER: _ClassVar[int]
+    PAD_RADIUS_M_FIELD_NUMBER: _ClassVar[int]
     scene_id: str
     level: int
     attempt: int
@@ -69,19 +74,52 @@ class Attempt(_message.Message):
     carried_m_s2: float
     borne_n: float
     weight_n: float
-    def __init__(self, scene_id: _Optional[str] = ..., level: _Optional[int] = ..., attempt: _Optional[int] = ..., outcome: _Optional[str] = ..., cause: _Optional[str] = ..., target: _Optional[str] = ..., candidates: _Optional[int] = ..., predicted_quality: _Optional[float] = ..., reached_quality: _Optional[float] = ..., seal_pressure: _Optional[float] = ..., lifted_height_m: _Optional[float] = ..., duration_s: _Optional[float] = ..., world_from_gripper: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., reached_pose: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., time_s: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., gripper_path: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., object_paths: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., base_wrench: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., states: _Optional[_Iterable[str]] = ..., policy: _Optional[str] = ..., candidate_poses: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., candidate_quality: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., corrections: _Optional[int] = ..., pictures: _Optional[_Iterable[_Union[DepthPicture, _Mapping]]] = ..., regrasps: _Optional[int] = ..., joint_path: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., seals: _Optional[int] = ..., carried_m_s2: _Optional[float] = ..., borne_n: _Optional[float] = ..., weight_n: _Optional[float] = ...) -> None: ...
+    pressure: _tensor_pb2.Tensor
+    seen: _containers.RepeatedCompositeFieldContainer[DepthPicture]
+    contacts: _containers.RepeatedCompositeFieldContainer[TriedContact]
+    judge: str
+    pad_radius_m: float
+    def __init__(self, scene_id: _Optional[str] = ..., level: _Optional[int] = ..., attempt: _Optional[int] = ..., outcome: _Optional[str] = ..., cause: _Optional[str] = ..., target: _Optional[str] = ..., candidates: _Optional[int] = ..., predicted_quality: _Optional[float] = ..., reached_quality: _Optional[float] = ..., seal_pressure: _Optional[float] = ..., lifted_height_m: _Optional[float] = ..., duration_s: _Optional[float] = ..., world_from_gripper: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., reached_pose: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., time_s: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., gripper_path: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., object_paths: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., base_wrench: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., states: _Optional[_Iterable[str]] = ..., policy: _Optional[str] = ..., candidate_poses: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., candidate_quality: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., corrections: _Optional[int] = ..., pictures: _Optional[_Iterable[_Union[DepthPicture, _Mapping]]] = ..., regrasps: _Optional[int] = ..., joint_path: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., seals: _Optional[int] = ..., carried_m_s2: _Optional[float] = ..., borne_n: _Optional[float] = ..., weight_n: _Optional[float] = ..., pressure: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., seen: _Optional[_Iterable[_Union[DepthPicture, _Mapping]]] = ..., contacts: _Optional[_Iterable[_Union[TriedContact, _Mapping]]] = ..., judge: _Optional[str] = ..., pad_radius_m: _Optional[float] = ...) -> None: ...
+
+class TriedContact(_message.Message):
+    __slots__ = ("world_from_contact", "predicted_quality", "held", "lifted", "cloud", "cloud_mask", "pictures")
+    WORLD_FROM_CONTACT_FIELD_NUMBER: _ClassVar[int]
+    PREDICTED_QUALITY_FIELD_NUMBER: _ClassVar[int]
+    HELD_FIELD_NUMBER: _ClassVar[int]
+    LIFTED_FIELD_NUMBER: _ClassVar[int]
+    CLOUD_FIELD_NUMBER: _ClassVar[int]
+    CLOUD_MASK_FIELD_NUMBER: _ClassVar[int]
+    PICTURES_FIELD_NUMBER: _ClassVar[int]
+    world_from_contact: _tensor_pb2.Tensor
+    predicted_quality: float
+    held: bool
+    lifted: bool
+    cloud: _tensor_pb2.Tensor
+    cloud_mask: _tensor_pb2.Tensor
+    pictures: int
+    def __init__(self, world_from_contact: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., predicted_quality: _Optional[float] = ..., held: _Optional[bool] = ..., lifted: _Optional[bool] = ..., cloud: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., cloud_mask: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., pictures: _Optional[int] = ...) -> None: ...
 
 class DepthPicture(_message.Message):
-    __slots__ = ("camera", "depth_mm", "intrinsics", "world_from_camera")
+    __slots__ = ("camera", "depth_mm", "intrinsics", "world_from_camera", "step", "left_px", "top_px", "whole_width_px", "whole_height_px")
     CAMERA_FIELD_NUMBER: _ClassVar[int]
     DEPTH_MM_FIELD_NUMBER: _ClassVar[int]
     INTRINSICS_FIELD_NUMBER: _ClassVar[int]
     WORLD_FROM_CAMERA_FIELD_NUMBER: _ClassVar[int]
+    STEP_FIELD_NUMBER: _ClassVar[int]
+    LEFT_PX_FIELD_NUMBER: _ClassVar[int]
+    TOP_PX_FIELD_NUMBER: _ClassVar[int]
+    WHOLE_WIDTH_PX_FIELD_NUMBER: _ClassVar[int]
+    WHOLE_HEIGHT_PX_FIELD_NUMBER: _ClassVar[int]
     camera: str
     depth_mm: _tensor_pb2.Tensor
     intrinsics: _tensor_pb2.Tensor
     world_from_camera: _tensor_pb2.Tensor
-    def __init__(self, camera: _Optional[str] = ..., depth_mm: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., intrinsics: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., world_from_camera: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ...) -> None: ...
+    step: int
+    left_px: int
+    top_px: int
+    whole_width_px: int
+    whole_height_px: int
+    def __init__(self, camera: _Optional[str] = ..., depth_mm: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., intrinsics: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., world_from_camera: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., step: _Optional[int] = ..., left_px: _Optional[int] = ..., top_px: _Optional[int] = ..., whole_width_px: _Optional[int] = ..., whole_height_px: _Optional[int] = ...) -> None: ...
 
 class LevelResult(_message.Message):
     __slots__ = ("level", "attempts", "lifted", "objects", "clutters", "cleared", "success_rate", "interval_low", "interval_high", "failures", "policy", "seconds_a_pick", "picks_an_hour", "seals", "lifted_at_first_seal", "carried")
