@@ -16,12 +16,14 @@ from pipeline.reporting.agreement import as_markdown
 from pipeline.reporting.facts import read_catalogue, read_origins, read_success, read_summary
 from pipeline.reporting.failures import failures_of
 from pipeline.reporting.figures import figures_of, overall_rates
+from pipeline.reporting.lineage import lineage_of, lineage_svg
 from pipeline.reporting.page import html_page, markdown_page
 from pipeline.reporting.words import describe_meshes, headline, mixed_parts
 from stages.graph import MADE, RUNS_DIR
 
 GOALS = {"evaluate": "eval"}  # what `make` calls a stage, where it is another word
 FAILURES = 8  # as many as a page has room for
+LINEAGE = "lineage"
 FIGURES = "report"  # folder of the pictures, beside the page
 
 
@@ -54,6 +56,7 @@ def make_report(folder: RunFolder) -> Path:
     success = read_success(folder.artifact("evaluate")) if summaries["evaluate"] else {}
     referee = read_summary(RunFolder(folder.path / "referee").summary("referee"))
     figures = figures_of(folder, summaries, catalogue, success, referee)
+    figures[LINEAGE] = lineage_svg(lineage_of(folder, summaries, catalogue))
     failures, pictures = (
         failures_of(folder, config, next(iter(success)), FAILURES) if success else ([], {})
     )
@@ -96,8 +99,8 @@ def make_report(folder: RunFolder) -> Path:
     for path, data in files.items():
         publish_bytes(folder.path / path, data)
     publish_bytes(folder.path / "report.md", text.encode())
-    page = folder.path / "report.html"
-    publish_bytes(page, html_page(text, title, files).encode())
+    page, linked = folder.path / "report.html", f"{FIGURES}/{LINEAGE}.svg"
+    publish_bytes(page, html_page(text, title, files, {linked}).encode())
     return page
 
 

@@ -14,6 +14,7 @@ from pipeline.artifacts.bounds import MOST_CHUNK_BYTES
 from pipeline.artifacts.provenance import METADATA_NAME, Provenance
 from pipeline.artifacts.publishing import published
 from pipeline.errors import ArtifactError
+from schemas.channels import DESCRIPTION, UNITS, channel_of
 
 CHUNK_BYTES = 1 << 20  # a chunk is closed once it holds more
 Compression = Literal["zstd", "lz4", "none"]
@@ -39,6 +40,7 @@ class ArtifactWriter:
         self._compression = COMPRESSIONS[compression]
         self._channels: dict[str, tuple[int, str]] = {}
         self._schemas: dict[str, int] = {}
+        self._described: dict[str, dict[str, str]] = {}
 
     def __enter__(self) -> Self:
         self._stack = ExitStack()
@@ -53,6 +55,20 @@ class ArtifactWriter:
         self._writer.start(profile="", library="softgrip")
         self._writer.add_metadata(METADATA_NAME, self._provenance.to_metadata())
         return self
+
+    def describe(self, topic: str, description: str, units: str) -> None:
+        """Say what a topic carries, before its first message; our own topics are known.
+
+        Parameters
+        ----------
+        topic
+            The topic.
+        description
+            What one message is.
+        units
+            Units of its numbers, and their frame where they have one.
+        """
+        self._described[topic] = {DESCRIPTION: description, UNITS: units}
 
     def write(self, topic: str, message: Message, log_time_ns: int) -> None:
         """Append a message.
@@ -87,12 +103,15 @@ class ArtifactWriter:
                 "Put less into one message",
             )
         if topic not in self._channels:
+            if (known := channel_of(topic)) is not None:
+                self._described.setdefault(topic, known.metadata())
             if name not in self._schemas:
                 self._schemas[name] = register_schema(self._writer, type(message))
             channel = self._writer.register_channel(
                 topic=topic,
                 message_encoding=MessageEncoding.Protobuf,
                 schema_id=self._schemas[name],
+                metadata=self._described.get(topic, {}),
             )
             self._channels[topic] = (channel, name)
         self._writer.add_message(

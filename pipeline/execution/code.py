@@ -24,6 +24,7 @@ RUNNING = (
     "pipeline.execution.running",
     "pipeline.execution.sealing",
     "pipeline.execution.staleness",
+    "pipeline.interchange.foxglove_layouts",
     "pipeline.progress",
     "pipeline.stopwatch",
     "stages.graph",

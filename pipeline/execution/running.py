@@ -16,7 +16,7 @@ import typer
 from filelock import FileLock, Timeout
 from loguru import logger
 
-from pipeline.artifacts import publish_bytes, read_provenance
+from pipeline.artifacts import open_artifact, publish_bytes, read_provenance
 from pipeline.artifacts.publishing import CANNOT_WRITE, remove_abandoned_scratch, write_error
 from pipeline.errors import SoftgripError
 from pipeline.execution.commands import EXIT_FAILURE, log_to
@@ -31,6 +31,7 @@ from pipeline.execution.staleness import (
     is_fresh,
     stage_context,
 )
+from pipeline.interchange.foxglove_layouts import foxglove_layout
 from pipeline.stopwatch import processor_time_s
 
 Summary = dict[str, Any]
@@ -101,7 +102,7 @@ def stage_command(
 def run_stage(
     context: StageContext, build: Build, force: bool = False, draw: Draw | None = None
 ) -> None:
-    """Run a stage unless it is fresh; leave artifact, recording and summary.
+    """Run a stage unless it is fresh; leave artifact, recording, summary and layout.
 
     Where the recording alone is stale, it is drawn anew and the artifact stays as it is.
     """
@@ -133,6 +134,8 @@ def run_stage(
         **figures,
     }
     _publish_summary(context, record)
+    with open_artifact(output) as artifact:
+        publish_bytes(context.folder.layout(name), foxglove_layout(artifact.counts()))
     logger.info("{}: done in {:.1f} s, {}", name, wall_s, output)
 
 

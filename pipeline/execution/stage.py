@@ -75,6 +75,10 @@ class RunFolder:
         """The headline figures of a stage."""
         return self.path / f"{stage}.summary.json"
 
+    def layout(self, stage: str) -> Path:
+        """The layout by which Foxglove shows a stage's artifact."""
+        return self.path / f"{stage}.foxglove.json"
+
     def log(self, stage: str) -> Path:
         """The log of a stage's last runs, traces included."""
         return self.path / "logs" / f"{stage}.log"

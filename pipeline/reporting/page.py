@@ -1,7 +1,7 @@
 """The report as one Markdown text, and as one HTML page that needs no other file."""
 
 import base64
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import PurePosixPath
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -33,7 +33,9 @@ def cell(value: object) -> str:
     return "".join(f"\\{mark}" if mark in "\\|`*_[]<>" else mark for mark in text)
 
 
-def html_page(markdown: str, title: str, files: Mapping[str, bytes]) -> str:
+def html_page(
+    markdown: str, title: str, files: Mapping[str, bytes], linked: Collection[str] = ()
+) -> str:
     """The page of a Markdown text, the pictures it shows inside.
 
     Parameters
@@ -44,6 +46,8 @@ def html_page(markdown: str, title: str, files: Mapping[str, bytes]) -> str:
         Of the browser's window.
     files
         Path as the text names it → content.
+    linked
+        Paths of SVG pictures of ours with links in them: they become part of the page.
 
     Returns
     -------
@@ -51,16 +55,18 @@ def html_page(markdown: str, title: str, files: Mapping[str, bytes]) -> str:
     """
     parser = MarkdownIt("commonmark", {"html": False}).enable("table")
     parser.add_render_rule("image", _embedded)
-    body = parser.render(markdown, {"files": files})
+    body = parser.render(markdown, {"files": files, "linked": linked})
     return markdown_page("page.html.jinja", {"title": title, "body": body})
 
 
 def _embedded(
     renderer: RendererHTML, tokens: Sequence[Token], index: int, options: OptionsDict, env: EnvType
 ) -> str:
-    """A picture as a data URI, its caption the alternative text."""
+    """A picture as a data URI, its caption the alternative text; a linked one as it is."""
     token = tokens[index]
     path = str(token.attrs["src"])
+    if path in env["linked"]:
+        return str(env["files"][path].decode())
     media = MEDIA_TYPES[PurePosixPath(path).suffix]
     data = base64.b64encode(env["files"][path]).decode()
     return f'<img alt="{token.content}" src="data:{media};base64,{data}">'

@@ -60,6 +60,7 @@ def by_us(path: Path) -> dict[str, Any]:
         "counts": counts,
         "metadata": metadata,
         "attachments": attachments,
+        "channels": {channel.topic: channel.metadata for channel in summary.channels.values()},
         "schemas": {
             schema.name: hashlib.sha256(schema.data).hexdigest()
             for schema in summary.schemas.values()

@@ -27,6 +27,17 @@ def test_every_stage_reads_alike_in_typescript(stage_files: list[Path]) -> None:
     assert by_node(stage_files) == [by_us(path) for path in stage_files]
 
 
+def test_a_stranger_finds_a_description_and_units_of_every_channel(
+    stage_files: list[Path],
+) -> None:
+    """By the TypeScript reader, from the files alone."""
+    for path, found in zip(stage_files, by_node(stage_files), strict=True):
+        assert found["channels"], path
+        for topic, metadata in found["channels"].items():
+            assert set(metadata) == {"description", "units"}, (path, topic)
+            assert all(metadata.values()), (path, topic)
+
+
 def test_rust_finds_nothing_wrong(stage_files: list[Path]) -> None:
     """Rerun's own check of structure and timelines."""
     rerun = Path(sys.executable).with_name("rerun")

@@ -18,6 +18,7 @@ from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder
 from pipeline.referee import agreement
 from schemas.softgrip.v1.grasps_pb2 import ShardIndex
+from stages.graph import STAGES
 from stages.report import make_report
 
 
@@ -27,13 +28,15 @@ class Page(HTMLParser):
     def __init__(self, text: str) -> None:
         super().__init__()
         self.sources: list[str] = []
+        self.links: list[str] = []
         self.tags: list[str] = []
         self.words = ""
         self.feed(text)
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags.append(tag)
-        self.sources += [value or "" for name, value in attrs if name in ("src", "href")]
+        self.sources += [value or "" for name, value in attrs if name == "src"]
+        self.links += [value or "" for name, value in attrs if name == "href"]
 
     def handle_data(self, data: str) -> None:
         self.words += data
@@ -50,6 +53,14 @@ def copied(run: RunFolder, tmp_path_factory: pytest.TempPathFactory) -> RunFolde
 
 def page_of(folder: RunFolder) -> Page:
     return Page((folder.path / "report.html").read_text())
+
+
+def test_the_lineage_leads_to_every_recording(copied: RunFolder) -> None:
+    links = page_of(copied).links
+    assert links == [f"{stage}.rrd" for stage in STAGES]
+    assert all((copied.path / link).is_file() for link in links)
+    words = page_of(copied).words
+    assert words.index("sources") < words.index("objects") < words.index("attempts")
 
 
 def test_the_page_needs_no_other_file(copied: RunFolder) -> None:

@@ -85,6 +85,10 @@ async function contents(path, decompressHandlers) {
     for await (const record of reader.readAttachments({ validateCrcs: true })) {
       attachments[record.name] = createHash("sha256").update(record.data).digest("hex");
     }
+    const channels = {};
+    for (const channel of reader.channelsById.values()) {
+      channels[channel.topic] = Object.fromEntries(channel.metadata);
+    }
     const schemas = {};
     for (const schema of reader.schemasById.values()) {
       schemas[schema.name] = createHash("sha256").update(schema.data).digest("hex");
@@ -95,6 +99,7 @@ async function contents(path, decompressHandlers) {
       counts,
       metadata,
       attachments,
+      channels,
       schemas,
       messages_sha256: digest.digest("hex"),
     };

@@ -1,0 +1,84 @@
+"""A layout has every panel once, and shows topics and fields that exist."""
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from pipeline.interchange.foxglove_layouts import foxglove_layout
+from schemas.channels import CHANNELS, channel_of
+from schemas.softgrip.v1 import evaluation_pb2, grasps_pb2, objects_pb2, training_pb2
+
+TOPICS = {
+    "objects": ("/objects", "/refused"),
+    "scenes": (
+        *("/scenes", "/tf", "/scene/a/colour", "/scene/a/calibration", "/scene/b/colour"),
+        *("/scene/b/calibration", "/scene/a/depth"),
+    ),
+    "grasps": ("/index",),
+    "train": ("/epochs", "/result"),
+    "evaluate": ("/attempts", "/levels", "/policies", "/comparisons"),
+    "sweep": ("/budget", "/networks"),
+    "of somebody": ("/slenderness",),
+}
+MESSAGES = (evaluation_pb2, grasps_pb2, objects_pb2, training_pb2)
+
+
+def leaves(tree: Any) -> Iterator[str]:
+    if isinstance(tree, str):
+        yield tree
+    elif tree is not None:
+        assert tree["direction"] in ("row", "column")
+        yield from leaves(tree["first"])
+        yield from leaves(tree["second"])
+
+
+def paths_of(value: Any) -> Iterator[str]:
+    """Every text of a configuration that begins like a topic."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            yield from paths_of(key)
+            yield from paths_of(inner)
+    elif isinstance(value, list):
+        for inner in value:
+            yield from paths_of(inner)
+    elif isinstance(value, str) and value.startswith("/"):
+        yield value
+
+
+@pytest.mark.parametrize("stage", TOPICS)
+def test_every_panel_stands_in_the_layout_once(stage: str) -> None:
+    layout = json.loads(foxglove_layout(TOPICS[stage]))
+    assert sorted(leaves(layout["layout"])) == sorted(layout["configById"])
+    assert layout["configById"]
+
+
+@pytest.mark.parametrize("stage", TOPICS)
+def test_panels_show_topics_of_the_file_and_fields_of_their_messages(stage: str) -> None:
+    layout = json.loads(foxglove_layout(TOPICS[stage]))
+    for path in paths_of(layout["configById"]):
+        topic, _, field = path.partition(".")
+        assert topic in TOPICS[stage]
+        channel = channel_of(topic)
+        if field:
+            assert channel is not None
+            name = channel.schemas[0].rpartition(".")[2]
+            (message,) = (getattr(m, name) for m in MESSAGES if hasattr(m, name))
+            assert field in message.DESCRIPTOR.fields_by_name
+
+
+def test_a_picture_is_shown_with_its_own_cameras_intrinsics() -> None:
+    panels = json.loads(foxglove_layout(TOPICS["scenes"]))["configById"]
+    modes = [config["imageMode"] for name, config in panels.items() if name.startswith("Image!")]
+    assert modes == [
+        {"imageTopic": f"/scene/{c}/colour", "calibrationTopic": f"/scene/{c}/calibration"}
+        for c in "ab"
+    ]
+
+
+def test_channels_have_topics_of_their_own_and_words_for_everything() -> None:
+    assert len({channel.topic for channel in CHANNELS}) == len(CHANNELS)
+    assert all(channel.description and channel.units and channel.schemas for channel in CHANNELS)
+    assert channel_of("/scene/wrist_0/depth") is not None
+    assert channel_of("/slenderness") is None
