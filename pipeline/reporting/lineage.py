@@ -10,6 +10,7 @@ from html import escape
 from typing import Any
 
 from pipeline.execution import RunFolder
+from pipeline.geometry.catalogue import EMBEDDED
 from pipeline.housekeeping.listing import disk_use_bytes, size_in_words
 from pipeline.reporting.facts import CatalogueFacts
 
@@ -59,8 +60,9 @@ def lineage_of(
     -------
     The steps in the order of the pipeline.
     """
-    files = {item.source for item in catalogue.objects} | {name for name, _ in catalogue.refused}
-    steps = [Step("sources", f"{len(files)} taken or refused", 0, "")]
+    files = {item.name if item.source == EMBEDDED else item.source for item in catalogue.objects}
+    found = len(files | {name for name, _ in catalogue.refused})
+    steps = [Step("sources", str(found), 0, "")]
     counted = {
         "objects": ("objects", lambda s: str(s["objects"])),
         "scenes": ("scenes", lambda s: str(s["scenes"])),
