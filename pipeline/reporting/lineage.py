@@ -17,6 +17,15 @@ from pipeline.reporting.facts import CatalogueFacts
 # Of a box and the arrow behind it, in pixels of a page 54 rem wide.
 BOX_WIDTH, BOX_HEIGHT, ARROW = 104, 62, 18
 LINES = (20, 37, 53)  # baselines of a box's three lines, below its top, in pixels
+# Stage → what it makes.
+NAMES = {
+    "objects": "objects",
+    "scenes": "scenes",
+    "grasps": "grasps",
+    "shards": "samples",
+    "train": "network",
+    "evaluate": "attempts",
+}
 MARGIN = 2  # room for half of the outline, in pixels
 
 
@@ -63,21 +72,23 @@ def lineage_of(
     files = {item.name if item.source == EMBEDDED else item.source for item in catalogue.objects}
     found = len(files | {name for name, _ in catalogue.refused})
     steps = [Step("sources", str(found), 0, "")]
-    counted = {
-        "objects": ("objects", lambda s: str(s["objects"])),
-        "scenes": ("scenes", lambda s: str(s["scenes"])),
-        "grasps": ("grasps", lambda s: str(s["grasps"])),
-        "shards": ("samples", lambda s: str(sum(s["samples"].values()))),
-        "train": ("network", lambda s: f"{s['parameters']} weights"),
-        "evaluate": ("attempts", lambda s: str(s["attempts"])),
-    }
-    for stage, (name, count) in counted.items():
+    for stage, name in NAMES.items():
         if (summary := summaries.get(stage)) is None:
             continue
         size = disk_use_bytes(folder.artifact(stage)) + disk_use_bytes(folder.shards(stage))
         recording = folder.recording(stage)
-        steps.append(Step(name, count(summary), size, recording.name * recording.is_file()))
+        link = recording.name if recording.is_file() else ""
+        steps.append(Step(name, counted(stage, summary), size, link))
     return steps
+
+
+def counted(stage: str, summary: dict[str, Any]) -> str:
+    """How many a stage made, in words."""
+    if stage == "shards":
+        return str(sum(summary["samples"].values()))
+    if stage == "train":
+        return f"{summary['parameters']} weights"
+    return str(summary[NAMES[stage]])
 
 
 def lineage_svg(steps: Sequence[Step]) -> str:
