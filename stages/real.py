@@ -108,8 +108,14 @@ def tried(frame: Frame, source: QualitySource, kept_to_mask: bool, config: RunCo
         seconds.append(time.perf_counter() - began)
         return found
 
+    def changed(seen: Frame, draw: int) -> Proposals | None:
+        try:
+            return proposed(seen, draw)
+        except PictureError:  # the change has left nothing; it counts as a choice that is gone
+            return None
+
     shown = frame if kept_to_mask else unmasked(frame)
-    settings = config.predict.trial
+    settings, apart_m = config.predict.trial, config.predict.apart_m
     try:
         found = proposed(shown, 0)
     except PictureError as error:
@@ -122,10 +128,10 @@ def tried(frame: Frame, source: QualitySource, kept_to_mask: bool, config: RunCo
     thinned: Stability | None = None
     if first is not None:
         draws = range(1, 1 + settings.repeats)
-        redrawn = stability_of(first, [proposed(shown, draw) for draw in draws])
+        redrawn = stability_of(first, [changed(shown, draw) for draw in draws], apart_m)
         lost = generator(config.seed, "lost", frame.name)
         few = [with_lost_pixels(shown, settings.lost_share, lost) for _ in draws]
-        thinned = stability_of(first, [proposed(one, 0) for one in few])
+        thinned = stability_of(first, [changed(one, 0) for one in few], apart_m)
     return FrameTrial(
         frame,
         source.name,

@@ -14,7 +14,7 @@ import numpy as np
 from pipeline.camera.bags import RecordedPicture
 from pipeline.camera.frame import Frame
 from pipeline.camera.proposals import Proposals, apart, clear_of_support, support_of
-from pipeline.camera.support import Support, inside
+from pipeline.camera.support import Support, stands_out
 from pipeline.config import RunConfig
 from pipeline.control.candidates import candidates_at
 from pipeline.control.clearance import free_of_collision
@@ -80,12 +80,7 @@ class LiveGrasps:
         policy = config.evaluate.policy
         thin = _thinned(moved, settings.live.cloud_every_px)
         cloud = merged_cloud([thin], policy.voxel_m, policy.above_table_m)
-        eye = moved.camera.world_from_camera[:3, 3]
-        distance_m = np.linalg.norm(cloud.points_m - eye, axis=1)
-        least = np.maximum(settings.above_support_m, settings.above_support_share * distance_m)
-        chosen = cloud.points_m[:, 2] > least
-        chosen[chosen] = inside(support, cloud.points_m[chosen], settings.support)
-        objects = cloud.take(chosen)
+        objects = cloud.take(stands_out(support, cloud.points_m, cloud.eye_m, settings))
         parts.done("cloud")
         if len(objects) == 0:
             return _nothing(support)

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from scipy import ndimage
 
 from pipeline.camera.frame import Frame
-from pipeline.camera.support import UP_IN_CAMERA, Support, find_support, inside, level_support
+from pipeline.camera.support import UP_IN_CAMERA, Support, find_support, level_support, stands_out
 from pipeline.config import RunConfig
 from pipeline.config.evaluation import HandConfig
 from pipeline.control.candidates import Candidates, candidates_at
@@ -104,8 +105,18 @@ def propose_grasps(
             f"{frames[0].name}: nothing stands out of the support where grasps are allowed",
             "Check mask and workspace, or lower predict.above_support_m",
         )
-    found, left_out = _candidates(cloud, pictures, support, config, rng)
+    drawn = rng.integers(len(cloud), size=config.predict.candidates)
+    obstacles = merged_cloud(pictures, policy.voxel_m, policy.above_table_m)
+    found, left_out = _candidates(cloud, drawn, obstacles, support, config)
     quality = ranking(pictures, found) if len(found) else np.empty(0)
+    if len(found):
+        first = apart(found.world_from_contact[:, :3, 3], quality, config.predict.apart_m)
+        places = found.world_from_contact[first[: config.predict.closer_places], :3, 3]
+        drawn = _near(cloud, places, config, rng)
+        closer, more = _candidates(cloud, drawn, obstacles, support, config)
+        left_out += more
+        found = found.joined(closer)
+        quality = ranking(pictures, found)
     kept = apart(found.world_from_contact[:, :3, 3], quality, config.predict.apart_m)
     left_out["near a better one"] = len(quality) - len(kept)
     best = kept[: config.predict.top]
@@ -232,41 +243,68 @@ def _upright(frame: Frame) -> Float[np.ndarray, "4 4"]:
 
 def _graspable(frame: Frame, support: Support | None, config: RunConfig) -> Bool[np.ndarray, "h w"]:
     """Pixels that are allowed and show what stands out of the support, within its walls."""
-    settings = config.predict
     points, rows, columns = points_of_depth(frame.depth_m, frame.camera, 1)
     chosen = frame.allowed[rows, columns]
     if support is not None:
-        eye = frame.camera.world_from_camera[:3, 3]
-        distance_m = np.linalg.norm(points - eye, axis=1)
-        least = np.maximum(settings.above_support_m, settings.above_support_share * distance_m)
-        chosen &= points[:, 2] > least
-        chosen[chosen] = inside(support, points[chosen], settings.support)
+        eye = np.broadcast_to(frame.camera.world_from_camera[:3, 3], points.shape)
+        chosen[chosen] = stands_out(support, points[chosen], eye[chosen], config.predict)
     picture = np.zeros(frame.depth_m.shape, dtype=bool)
     picture[rows[chosen], columns[chosen]] = True
-    return picture
+    return np.asarray(picture & _large_enough(frame, picture, config))
+
+
+def _large_enough(
+    frame: Frame, shown: Bool[np.ndarray, "h w"], config: RunConfig
+) -> Bool[np.ndarray, "h w"]:
+    """Pixels of pieces that are no specks: noise at a bin's walls stands out here and there."""
+    pieces, count = ndimage.label(shown, structure=np.ones((3, 3)))
+    # A pixel covers at least as much of the surface as of a plane that faces the camera.
+    focal = frame.camera.intrinsics
+    pixels_m2 = frame.depth_m**2 / (focal[0, 0] * focal[1, 1])
+    areas_m2 = np.bincount(pieces.ravel(), weights=pixels_m2.ravel(), minlength=count + 1)
+    pad_m2 = np.pi * config.gripper.pad.radius_m**2
+    return np.asarray(areas_m2[pieces] >= config.predict.speck_share * pad_m2)
+
+
+def _near(
+    cloud: Cloud,
+    places_m: Float[np.ndarray, "k 3"],
+    config: RunConfig,
+    rng: np.random.Generator,
+) -> Int[np.ndarray, " n"]:
+    """Indices of points to try around the best places of the first look.
+
+    Contacts drawn over a whole bin lie centimetres apart, so the best of them is better by luck of
+    the draw and of the network's error. Around the best places they are drawn as near to each other
+    as the ranking averages.
+    """
+    within_m = config.predict.apart_m / 2
+    drawn = []
+    for place in places_m:
+        near = np.flatnonzero(np.linalg.norm(cloud.points_m - place, axis=1) <= within_m)
+        if len(near):
+            drawn.append(rng.choice(near, size=config.predict.closer_contacts))
+    return np.concatenate([np.empty(0, dtype=np.int64), *drawn])
 
 
 def _candidates(
     cloud: Cloud,
-    pictures: Sequence[DepthPicture],
+    drawn: Int[np.ndarray, " n"],
+    obstacles: Cloud,
     support: Support | None,
     config: RunConfig,
-    rng: np.random.Generator,
-) -> tuple[Candidates, dict[str, int]]:
-    """Contacts on what may be grasped, clear of all that was measured."""
+) -> tuple[Candidates, Counter[str]]:
+    """Contacts at points of what may be grasped, clear of all that was measured."""
     settings, hand = config.predict, config.evaluate.hand
-    at = rng.integers(len(cloud), size=settings.candidates)
     found = candidates_at(
         cloud,
-        cloud.points_m[at],
-        cloud.eye_m[at],
+        cloud.points_m[drawn],
+        cloud.eye_m[drawn],
         config.grasps.normal_radius_m,
         settings.tilt_max_rad,
     )
     left_out: Counter[str] = Counter()
-    left_out["too steep, or too small a surface"] = settings.candidates - len(found)
-    policy = config.evaluate.policy
-    obstacles = merged_cloud(pictures, policy.voxel_m, policy.above_table_m)
+    left_out["too steep, or too small a surface"] = len(drawn) - len(found)
     free = free_of_collision(found.world_from_contact, obstacles.points_m, hand)
     left_out["hand or stem would meet something"] = int((~free).sum())
     if support is not None:
@@ -278,7 +316,7 @@ def _candidates(
         )
         left_out["pad or stem would meet the support"] = int((free & ~clear).sum())
         free &= clear
-    return found.take(free), dict(left_out)
+    return found.take(free), left_out
 
 
 def _instances_at(

@@ -12,8 +12,9 @@ from jaxtyping import Bool, Float
 from scipy import ndimage
 from scipy.spatial import ConvexHull, QhullError
 
+from pipeline.camera.floor_bend import FloorBend, fit_floor_bend
 from pipeline.camera.planes import Plane, planes_of
-from pipeline.config.predict import SupportConfig
+from pipeline.config.predict import PredictConfig, SupportConfig
 from pipeline.errors import PictureError
 from pipeline.geometry.transforms import frame_from_z, invert, rotate_vectors, transform_points
 
@@ -40,6 +41,8 @@ class Support:
     rim_m
         Height of the walls' upper edge over the plane; infinite where there are not two walls
         [m].
+    bend
+        How the floor departs from the plane; None where too little of it is seen to tell.
     """
 
     world_from_support: Float[np.ndarray, "4 4"]
@@ -47,6 +50,12 @@ class Support:
     walls: tuple[Plane, ...]
     outline_m: Float[np.ndarray, "corners 2"]
     rim_m: float = np.inf
+    bend: FloorBend | None = None
+
+    def height_m(self, points_m: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, " n"]:
+        """Height of points of the support's frame over the floor, bent as it is [m]."""
+        height = points_m[:, 2]
+        return height if self.bend is None else height - self.bend.height_m(points_m[:, :2])
 
 
 def find_support(
@@ -131,12 +140,19 @@ def find_support(
     on_walls = np.zeros(len(local), dtype=bool)
     for wall in walls:
         on_walls |= (local[:, 2] > 2 * near_m) & (np.abs(wall.height_m(local)) <= near_m)
+    outline_m = _outline(local[ground, :2][piece])
+    within = (
+        _from_edge(outline_m, local[:, :2]) >= 0.0
+        if len(outline_m) >= 3
+        else np.zeros(len(local), dtype=bool)
+    )
     return Support(
         world_from_support=world_from_support,
         share=plane.share,
         walls=tuple(walls),
-        outline_m=_outline(local[ground, :2][piece]),
+        outline_m=outline_m,
         rim_m=float(np.percentile(local[on_walls, 2], 95)) if bin_like else np.inf,
+        bend=fit_floor_bend(local[within], near_m[within], config),
     )
 
 
@@ -145,6 +161,39 @@ def level_support(height_m: float) -> Support:
     pose = np.eye(4)
     pose[2, 3] = height_m
     return Support(pose, 0.0, (), np.empty((0, 2)))
+
+
+def stands_out(
+    support: Support,
+    points_m: Float[np.ndarray, "n 3"],
+    eyes_m: Float[np.ndarray, "n 3"],
+    config: PredictConfig,
+) -> Bool[np.ndarray, " n"]:
+    """Whether points belong to what stands on the support: off floor, walls and their rounding.
+
+    Parameters
+    ----------
+    support
+        What was found.
+    points_m
+        In the support's frame.
+    eyes_m
+        Where the camera stood that measured each, in the same frame.
+    config
+        How far out of the support things stand, and the margins of walls.
+
+    Returns
+    -------
+    Whether each point does, shape (n,).
+    """
+    distance_m = np.linalg.norm(points_m - eyes_m, axis=1)
+    least_m = np.maximum(config.above_support_m, config.above_support_share * distance_m)
+    height_m = support.height_m(points_m)
+    chosen = np.asarray(height_m > least_m)
+    chosen[chosen] = inside(support, points_m[chosen], config.support)
+    low = chosen & (height_m < config.support.rounding_m)
+    chosen[low] = ~_on_rounding(support, points_m[low], height_m[low], least_m[low], config.support)
+    return chosen
 
 
 def inside(
@@ -199,6 +248,76 @@ def _from_edge(
             normal = -normal
         nearest = np.minimum(nearest, (points_m - corner) @ normal)
     return nearest
+
+
+def _on_rounding(
+    support: Support,
+    points_m: Float[np.ndarray, "n 3"],
+    height_m: Float[np.ndarray, " n"],
+    least_m: Float[np.ndarray, " n"],
+    config: SupportConfig,
+) -> Bool[np.ndarray, " n"]:
+    """Whether points may belong to the rounding with which a bin's floor passes into its walls.
+
+    A ball of the rounding's radius that rolls in the bin stays a radius away from floor and walls.
+    What it cannot touch lies more than a radius from all places that its centre can be in.
+
+    Parameters
+    ----------
+    support
+        What was found; without two walls it is no bin, and has no rounding.
+    points_m
+        In the support's frame.
+    height_m
+        Height of each over the floor [m].
+    least_m
+        How far out of a surface each must stand to be told from it [m].
+    config
+        The rounding's radius, and margins.
+
+    Returns
+    -------
+    Whether each point may, shape (n,).
+    """
+    if len(support.walls) < 2 or len(support.outline_m) < 3:
+        return np.zeros(len(points_m), dtype=bool)
+    radius_m = config.rounding_m
+    # How far the ball's centre must keep inwards of each point, for each wall.
+    lacking = [radius_m - wall.height_m(points_m) for wall in support.walls]
+    across = np.maximum(np.max(lacking, axis=0), 0.0)
+    for i, one in enumerate(support.walls):
+        for j in range(i):
+            turn = float(one.normal @ support.walls[j].normal)
+            across = np.maximum(across, _to_corner(lacking[i], lacking[j], turn))
+    # A wall that is hidden or not flat ends the outline, a margin inwards of itself.
+    edge_m = _from_edge(support.outline_m, points_m[:, :2]) + config.wall_margin_m
+    across = np.maximum(across, radius_m - edge_m)
+    up = np.maximum(radius_m - height_m, 0.0)
+    return np.asarray(np.hypot(across, up) > radius_m - least_m)
+
+
+def _to_corner(
+    first_m: Float[np.ndarray, " n"], second_m: Float[np.ndarray, " n"], turn: float
+) -> Float[np.ndarray, " n"]:
+    """Distance to the wedge between two planes, where both are lacking [m].
+
+    Parameters
+    ----------
+    first_m
+        How far each point is outside the first plane, negative inside [m].
+    second_m
+        The same of the second [m].
+    turn
+        Cosine between their normals.
+
+    Returns
+    -------
+    Distance where the nearest place of the wedge lies on its edge, else 0; shape (n,).
+    """
+    at_edge = (second_m > turn * first_m) & (first_m > turn * second_m)
+    square = first_m**2 + second_m**2 - 2.0 * turn * first_m * second_m
+    sine2 = max(1.0 - turn**2, 1e-9)
+    return np.where(at_edge, np.sqrt(np.maximum(square, 0.0) / sine2), 0.0)
 
 
 def _parallel(

@@ -30,6 +30,8 @@ class FirstChoice:
         Its pose, shape (4, 4).
     quality
         Its q-hat.
+    best_m
+        Places of the best grasps, this one first, shape (k, 3) [m].
     in_mask
         Whether it lies in the frame's mask; None where there is no mask.
     off_edges
@@ -38,6 +40,7 @@ class FirstChoice:
 
     world_from_contact: Float[np.ndarray, "4 4"]
     quality: float
+    best_m: Float[np.ndarray, "k 3"]
     in_mask: bool | None
     off_edges: bool
 
@@ -46,17 +49,23 @@ class FirstChoice:
 class Stability:
     """First choices of the same frame under changes that change nothing in the scene.
 
+    A first choice may move to a place that is as good, as on the face of a large box: so beside the
+    distance stand its q-hat and how many of the best places are found again.
+
     Attributes
     ----------
     moved_m
         How far each lies from the first choice without the change; infinite where none was left
         [m].
-    quality
-        q-hat of each, 0 where none was left.
+    quality_change
+        q-hat of each less that without the change; a missing one counts as 0.
+    found_again
+        Of the best places without the change, the share that is among the best with each.
     """
 
     moved_m: Float[np.ndarray, " n"]
-    quality: Float[np.ndarray, " n"]
+    quality_change: Float[np.ndarray, " n"]
+    found_again: Float[np.ndarray, " n"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +145,7 @@ def first_choice(
     return FirstChoice(
         world_from_contact=pose,
         quality=float(found.quality[0]),
+        best_m=found.world_from_contact[: config.compared, :3, 3],
         in_mask=bool(seen[0] and frame.allowed[row, column]) if masked else None,
         off_edges=edge_share(frame, pose, radius_m, config) <= config.edge_share_max,
     )
@@ -182,24 +192,34 @@ def edge_share(
     return float(np.mean(~on_surface))
 
 
-def stability_of(first: FirstChoice, others: Sequence[Proposals]) -> Stability:
-    """How far the first choices of other draws lie from one.
+def stability_of(
+    first: FirstChoice, others: Sequence[Proposals | None], apart_m: float
+) -> Stability:
+    """How far the first choices of other draws lie from one, and whether the best are the same.
 
     Parameters
     ----------
     first
         Without a change.
     others
-        Grasps found under each change.
+        Grasps found under each change; None where there could be none.
+    apart_m
+        Two grasps nearer than this are in one place [m].
 
     Returns
     -------
-    Distance and q-hat of the best of each.
+    Distance, change of q-hat and share of places found again, for each of them.
     """
-    place = first.world_from_contact[:3, 3]
-    moved = [
-        float(np.linalg.norm(found.world_from_contact[0, :3, 3] - place)) if len(found) else np.inf
-        for found in others
-    ]
-    quality = [float(found.quality[0]) if len(found) else 0.0 for found in others]
-    return Stability(np.array(moved), np.array(quality))
+    moved, change, again = [], [], []
+    for found in others:
+        if found is None or len(found) == 0:
+            moved.append(np.inf)
+            change.append(-first.quality)
+            again.append(0.0)
+            continue
+        best_m = found.world_from_contact[: len(first.best_m), :3, 3]
+        away_m = np.linalg.norm(first.best_m[:, None] - best_m[None], axis=2)
+        moved.append(float(away_m[0, 0]))
+        change.append(float(found.quality[0]) - first.quality)
+        again.append(float(np.mean((away_m < apart_m).any(axis=1))))
+    return Stability(np.array(moved), np.array(change), np.array(again))

@@ -49,6 +49,18 @@ class SupportConfig(Section):
     wall_margin_m: float = Field(
         0.012, ge=0, description="what lies this near to a wall belongs to it [m]"
     )
+    rounding_m: float = Field(
+        0.05,
+        ge=0,
+        description="a bin's floor passes into its walls, and walls into each other, with a radius "
+        "of at most so much [m]",
+    )
+    bend_seen_share: float = Field(
+        0.5,
+        ge=0,
+        le=1,
+        description="of the support's outline, how much must show floor to tell how it is bent [1]",
+    )
     rim_m: float = Field(
         0.035,
         ge=0,
@@ -76,6 +88,9 @@ class TrialConfig(Section):
         "[rad]",
     )
     repeats: int = Field(3, ge=1, le=100, description="draws of new contacts, and of lost pixels")
+    compared: int = Field(
+        5, ge=1, le=100, description="of the best grasps, how many are looked for again"
+    )
     lost_share: float = Field(0.2, ge=0, lt=1, description="of the pixels, how many are lost [1]")
     edge_clear_share: float = Field(
         0.5, gt=0, le=2, description="an edge is near within so much of the pad's radius [1]"
@@ -116,6 +131,18 @@ class PredictConfig(Section):
     """From a real picture to ranked grasps."""
 
     candidates: int = Field(512, ge=1, le=8192, description="contacts that are tried a picture")
+    closer_places: int = Field(
+        12, ge=0, le=256, description="of the best places, how many are looked at more closely"
+    )
+    closer_contacts: int = Field(
+        24, ge=1, le=256, description="contacts that are tried around each of them"
+    )
+    speck_share: float = Field(
+        0.1,
+        ge=0,
+        le=1,
+        description="a piece that shows less than this share of the pad's area is noise [1]",
+    )
     top: int = Field(20, ge=1, le=1000, description="grasps that are given out")
     apart_m: float = Field(
         0.02,

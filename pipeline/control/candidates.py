@@ -38,6 +38,13 @@ class Candidates:
         """The candidates at the given indices, or where a mask is true."""
         return Candidates(self.world_from_contact[chosen], self.roughness_m[chosen])
 
+    def joined(self, others: "Candidates") -> "Candidates":
+        """These candidates, then others."""
+        return Candidates(
+            np.concatenate([self.world_from_contact, others.world_from_contact]),
+            np.concatenate([self.roughness_m, others.roughness_m]),
+        )
+
 
 _NONE = Candidates(np.empty((0, 4, 4)), np.empty(0))  # no candidate at all
 

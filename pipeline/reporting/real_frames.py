@@ -63,9 +63,15 @@ def trial_page(figures: Mapping[str, Any], config: PredictConfig, sheet: str) ->
         f"| {row['frames']} | {row['with_a_choice']} | {row['good']} "
         f"| {_of(row['in_mask'], row['masked'])} | {_of(row['off_edges'], row['with_a_choice'])} "
         f"| {_of(row['in_mask_and_off_edges'], row['masked'])} "
-        f"| {_share(row['stays_redrawn'])} | {_share(row['stays_thinned'])} "
         f"| {row['seconds']:.2f} s |"
         for row in figures["together"]
+    )
+    stability = "\n".join(
+        f"| {cell(row['ranking'])} | {'within the mask' if row['kept_to_mask'] else 'everywhere'} "
+        f"| {change} | {_share(row[name]['stays'])} | {_share(row[name]['good_stays'])} "
+        f"| {_quality(row[name]['quality_change'])} | {_share(row[name]['found_again'])} |"
+        for row in figures["together"]
+        for name, change in (("redrawn", "contacts drawn anew"), ("thinned", "pixels lost"))
     )
     each = "\n".join(
         f"| {cell(row['frame'])} | {cell(row['ranking'])} "
@@ -83,15 +89,21 @@ def trial_page(figures: Mapping[str, Any], config: PredictConfig, sheet: str) ->
         "No robot tried them: what is told is whether a first choice lies in the mask that a "
         f"person drew, whether the surface goes on around it (within {trial.edge_clear_share:g} "
         f"of the pad's radius at most {100 * trial.edge_share_max:.0f} % of it is empty, beside "
-        f"the mask, or more than {1e3 * trial.edge_jump_m:.0f} mm off the pad's plane), and "
-        f"whether it stays within {1e3 * config.apart_m:.0f} mm when other contacts are drawn and "
-        f"when {100 * trial.lost_share:.0f} % of the pixels are lost, {trial.repeats} times each. "
-        f"Good is a q-hat of {config.quality_min:.2f} and more. Approaches are up to "
-        f"{np.degrees(trial.tilt_max_rad):.0f} degrees off the vertical.\n\n"
+        f"the mask, or more than {1e3 * trial.edge_jump_m:.0f} mm off the pad's plane), and what "
+        f"becomes of it when other contacts are drawn and when {100 * trial.lost_share:.0f} % of "
+        f"the pixels are lost, {trial.repeats} times each: it stays within "
+        f"{1e3 * config.apart_m:.0f} mm, or moves to a place whose q-hat is as high, as on the "
+        f"face of a large box; and how many of the best {trial.compared} places are among the "
+        f"best {trial.compared} again. Good is a q-hat of {config.quality_min:.2f} and more. "
+        f"Approaches are up to {np.degrees(trial.tilt_max_rad):.0f} degrees off the vertical.\n\n"
         "| ranking | grasps | frames | with a choice | good | in the mask | off edges "
-        "| both | stays, redrawn | stays, pixels lost | median time |\n"
-        "|-|-|-|-|-|-|-|-|-|-|-|\n"
+        "| both | median time |\n"
+        "|-|-|-|-|-|-|-|-|-|\n"
         f"{together}\n\n"
+        "| ranking | grasps | change | first choice stays | stays, where it is good "
+        "| q-hat of the first choice changes by (median) | of the best places found again |\n"
+        "|-|-|-|-|-|-|-|\n"
+        f"{stability}\n\n"
         + (f"Frames that cannot be read:\n\n{unreadable}\n" if unreadable else "")
         + f"![Top choices by frame]({sheet})\n\n"
         "| frame | ranking | grasps | q-hat | in the mask | off edges | moves when redrawn, mm "
@@ -111,8 +123,8 @@ def _together(group: Sequence[FrameTrial], apart_m: float) -> dict[str, Any]:
         "in_mask": sum(bool(first.in_mask) for first in masked),
         "off_edges": sum(first.off_edges for first in firsts),
         "in_mask_and_off_edges": sum(bool(first.in_mask) and first.off_edges for first in masked),
-        "stays_redrawn": _stays([trial.redrawn for trial in group], apart_m),
-        "stays_thinned": _stays([trial.thinned for trial in group], apart_m),
+        "redrawn": _stability([(trial, trial.redrawn) for trial in group], apart_m),
+        "thinned": _stability([(trial, trial.thinned) for trial in group], apart_m),
         "seconds": float(np.median([trial.seconds for trial in group])),
     }
 
@@ -130,28 +142,40 @@ def _one(trial: FrameTrial, apart_m: float) -> dict[str, Any]:
         "off_edges": first.off_edges if first else None,
         "redrawn_moved_mm": _millimetres(trial.redrawn),
         "thinned_moved_mm": _millimetres(trial.thinned),
-        "redrawn_quality": _qualities(trial.redrawn),
-        "thinned_quality": _qualities(trial.thinned),
-        "stays_redrawn": _stays([trial.redrawn], apart_m),
-        "stays_thinned": _stays([trial.thinned], apart_m),
+        "redrawn": _stability([(trial, trial.redrawn)], apart_m),
+        "thinned": _stability([(trial, trial.thinned)], apart_m),
         "seconds": trial.seconds,
     }
 
 
-def _stays(found: Sequence[Stability | None], apart_m: float) -> float | None:
-    """Share of the draws in which the first choice stays; None where nothing was drawn."""
-    moved = [one.moved_m for one in found if one is not None]
-    return float(np.mean(np.concatenate(moved) < apart_m)) if moved else None
+def _stability(
+    found: Sequence[tuple[FrameTrial, Stability | None]], apart_m: float
+) -> dict[str, float | None]:
+    """What becomes of first choices under one kind of change, over all draws."""
+    there = [(trial, one) for trial, one in found if one is not None]
+    good = [one for trial, one in there if trial.prediction is not None and trial.prediction.good]
+    each = [one for _, one in there]
+    return {
+        "stays": _mean([one.moved_m < apart_m for one in each]),
+        "good_stays": _mean([one.moved_m < apart_m for one in good]),
+        "quality_change": (
+            float(np.median(np.abs(np.concatenate([one.quality_change for one in each]))))
+            if each
+            else None
+        ),
+        "found_again": _mean([one.found_again for one in each]),
+    }
+
+
+def _mean(arrays: Sequence[np.ndarray]) -> float | None:
+    """Mean over all entries; None where there are none."""
+    return float(np.mean(np.concatenate(arrays))) if arrays else None
 
 
 def _millimetres(found: Stability | None) -> list[float | None]:
     if found is None:
         return []
     return [round(1e3 * float(m), 1) if np.isfinite(m) else None for m in found.moved_m]
-
-
-def _qualities(found: Stability | None) -> list[float]:
-    return [] if found is None else [round(float(q), 4) for q in found.quality]
 
 
 def _of(number: int, total: int) -> str:

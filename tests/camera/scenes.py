@@ -41,6 +41,24 @@ def bin_walls(inner_m: float = 0.4, height_m: float = 0.15) -> list[Mesh]:
     ]
 
 
+def rounded_bin(inner_m: float = 0.4, height_m: float = 0.15, rounding_m: float = 0.045) -> Mesh:
+    """A square bin whose floor passes into its walls with a radius, open above, floor at z = 0."""
+    rings = np.append(np.linspace(0.0, np.pi / 2, 9), np.nan)
+    half = inner_m / 2
+    vertices = []
+    for angle in rings:
+        top = np.isnan(angle)
+        out = half if top else half - rounding_m * (1.0 - np.sin(angle))
+        up = height_m if top else rounding_m * (1.0 - np.cos(angle))
+        vertices += [(x * out, y * out, up) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    faces = [(0, 1, 2), (0, 2, 3)]
+    for ring in range(len(rings) - 1):
+        for side in range(4):
+            a, b = 4 * ring + side, 4 * ring + (side + 1) % 4
+            faces += [(a, b, b + 4), (a, b + 4, a + 4)]
+    return Mesh(np.array(vertices, dtype=np.float64), np.array(faces, dtype=np.int64))
+
+
 def seen(
     bodies: list[Mesh],
     eye_m: tuple[float, float, float],

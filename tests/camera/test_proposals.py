@@ -19,6 +19,7 @@ from pipeline.camera.proposals import (
 )
 from pipeline.config import RunConfig
 from pipeline.config.evaluation import HandConfig
+from pipeline.control.candidates import Candidates
 from pipeline.control.ranking import GeometricRanking
 from pipeline.errors import PictureError
 from pipeline.geometry.transforms import frame_from_z
@@ -96,6 +97,42 @@ def test_two_views_are_merged() -> None:
     target = box((0.12, 0.10, 0.08), (0.0, 0.0, 0.04))
     views = [seen([table(), target], eye, 0.001, posed=True) for eye in (ABOVE, (-0.05, 0.35, 0.6))]
     assert proposed(views).world_from_contact[0, 2, 3] == pytest.approx(0.08, abs=0.004)
+
+
+def test_the_best_places_are_looked_at_more_closely() -> None:
+    target = box((0.12, 0.10, 0.08), (0.0, 0.0, 0.04))
+    asked: list[np.ndarray] = []
+
+    def nearest_to_the_corner(_: object, candidates: Candidates) -> np.ndarray:
+        places = candidates.world_from_contact[:, :3, 3]
+        asked.append(places)
+        return np.asarray(np.exp(-np.linalg.norm(places[:, :2] - (0.05, 0.04), axis=1)))
+
+    settings = {"candidates": 160, "closer_places": 3, "closer_contacts": 10}
+    config = RunConfig.model_validate({"predict": settings})
+    frame = seen([table(), target], ABOVE, 0.001, posed=True)
+    propose_grasps([frame], nearest_to_the_corner, config, np.random.default_rng(0))
+    first, both = asked
+    drawn_anew = both[len(first) :]
+    assert (both[: len(first)] == first).all()
+    assert 20 <= len(drawn_anew) <= 30
+    worth = nearest_to_the_corner(None, Candidates(pose_at(first), np.zeros(len(first))))
+    best = first[apart(first, worth, config.predict.apart_m)[:3]]
+    away = np.linalg.norm(drawn_anew[:, None] - best[None], axis=2).min(axis=1)
+    # A contact is moved from its drawn point onto the plane around it.
+    assert away.max() < config.predict.apart_m / 2 + 0.004
+
+
+def pose_at(places_m: np.ndarray) -> np.ndarray:
+    poses = np.tile(np.eye(4), (len(places_m), 1, 1))
+    poses[:, :3, 3] = places_m
+    return poses
+
+
+def test_a_speck_is_no_object() -> None:
+    crumb = box((0.008, 0.008, 0.02), (0.05, 0.0, 0.01))
+    with pytest.raises(PictureError, match="nothing stands out of the support"):
+        proposed([seen([table(), crumb], ABOVE, 0.0, posed=True)])
 
 
 def test_an_empty_table_says_so() -> None:

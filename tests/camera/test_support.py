@@ -4,15 +4,22 @@ import numpy as np
 import pytest
 
 from pipeline.camera.frame import Frame
-from pipeline.camera.support import UP_IN_CAMERA, Support, find_support, inside
+from pipeline.camera.support import (
+    UP_IN_CAMERA,
+    Support,
+    find_support,
+    inside,
+    stands_out,
+)
 from pipeline.config import RunConfig
 from pipeline.errors import PictureError
 from pipeline.geometry.transforms import invert, look_at, transform_points
 from pipeline.world.cameras import points_of_depth
-from tests.camera.scenes import bin_walls, box, seen, table
+from tests.camera.scenes import bin_walls, box, rounded_bin, seen, table
 
 SETTINGS = RunConfig().predict.support
 ABOVE = (0.05, -0.45, 0.6)
+LOOKED_AT = np.array([0.0, 0.0, 0.02])  # by every camera of tests.camera.scenes
 FROM_THE_SIDE = (0.1, -0.8, 0.35)
 OBJECTS = [
     box((0.10, 0.06, 0.08), (0.05, 0.05, 0.04)),
@@ -79,3 +86,24 @@ def test_a_plane_with_much_below_it_is_no_support() -> None:
     shelf = box((0.3, 0.25, 0.01), (0.0, 0.0, 0.3))
     found = support_of(seen([table(), shelf], (0.0, -0.5, 1.0), 0.001, posed=True))
     assert abs(found.world_from_support[2, 3]) < 0.004
+
+
+@pytest.mark.parametrize("eye", [(0.0, -0.1, 0.8), (0.05, -0.45, 0.65)])
+@pytest.mark.parametrize("posed", [True, False])
+def test_a_bins_rounded_foot_is_no_object(eye: tuple[float, float, float], posed: bool) -> None:
+    bodies = [rounded_bin(), box((0.06, 0.06, 0.04), (0.155, 0.1, 0.02))]
+    frame = seen(bodies, eye, 0.002, posed)
+    found = support_of(frame)
+    to_support = invert(found.world_from_support)
+    points, _, _ = points_of_depth(frame.depth_m, frame.camera, 1)
+    eyes = np.broadcast_to(frame.camera.world_from_camera[:3, 3], points.shape)
+    chosen = stands_out(
+        found,
+        transform_points(to_support, points),
+        transform_points(to_support, eyes),
+        RunConfig().predict,
+    )
+    world = points if posed else transform_points(look_at(np.array(eye), LOOKED_AT), points)
+    on_box = (np.abs(world[:, 0] - 0.155) < 0.033) & (np.abs(world[:, 1] - 0.1) < 0.033)
+    assert chosen[on_box & (world[:, 2] > 0.034)].mean() > 0.9
+    assert chosen[~on_box].mean() < 0.0005

@@ -94,11 +94,13 @@ def test_pixels_are_lost_by_their_share(frame: Frame) -> None:
 
 
 def test_stability_is_how_far_first_choices_lie_apart(frame: Frame) -> None:
-    first = first_choice(frame, found((0.0, 0.0)), RADIUS_M, CONFIG)
+    first = first_choice(frame, found((0.0, 0.0), (0.05, 0.0)), RADIUS_M, CONFIG)
     assert first is not None
-    stable = stability_of(first, [found((0.0, 0.03)), found(), found((0.0, 0.0))])
-    assert stable.moved_m.tolist() == [pytest.approx(0.03), np.inf, 0.0]
-    assert stable.quality.tolist() == [0.9, 0.0, 0.9]
+    others = [found((0.0, 0.03), (0.045, 0.0)), None, found((0.05, 0.0), (0.0, 0.0)), found()]
+    stable = stability_of(first, others, apart_m=0.02)
+    assert stable.moved_m.tolist() == [pytest.approx(0.03), np.inf, pytest.approx(0.05), np.inf]
+    assert stable.quality_change.tolist() == [0.0, -0.9, 0.0, -0.9]
+    assert stable.found_again.tolist() == [0.5, 0.0, 1.0, 0.0]
 
 
 def test_a_mask_can_be_taken_off(frame: Frame) -> None:
