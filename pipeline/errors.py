@@ -45,6 +45,10 @@ class PictureError(SoftgripError):
     """A picture, point cloud or camera file of the user is invalid."""
 
 
+class CalibrationError(SoftgripError):
+    """What a robot cell's calibration says is missing, impossible, or not good enough."""
+
+
 class PoseError(SoftgripError):
     """A given pose is not a rigid motion."""
 

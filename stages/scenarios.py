@@ -18,9 +18,10 @@ from pipeline.artifacts import publish_bytes
 from pipeline.config import RunConfig, load_run_config
 from pipeline.config.evaluation import PolicyName
 from pipeline.control.decision import Cause
+from pipeline.control.strategies import build_strategy
 from pipeline.control.success import success_rate
 from pipeline.execution import RunFolder, generator, progress, run_command, run_in_order
-from pipeline.simulation.picking import Clutter, build_strategy
+from pipeline.simulation.picking import Clutter
 from pipeline.simulation.scenarios import SCENARIOS, make_trials, with_segmentation
 from stages.evaluate import network
 from stages.graph import RUNS_DIR

@@ -60,7 +60,7 @@ def attempt_message(
         "reached_pose": made.reached_pose,
         "time_s": np.array([s.time_s for s in samples]),
         "gripper_path": np.array([s.world_from_gripper for s in samples]).reshape(-1, 4, 4),
-        "object_paths": np.array(objects).reshape(-1, bodies, 4, 4),
+        "object_paths": np.array(objects).reshape(len(samples), bodies, 4, 4),
         "base_wrench": np.array([s.wrench for s in samples]).reshape(-1, 6),
         "pressure": np.array([s.pressure for s in samples]),
     }

@@ -15,6 +15,7 @@ from jaxtyping import Float
 from pipeline.config import RunConfig
 from pipeline.control.attempts import Sample
 from pipeline.control.robot import Reading, State
+from pipeline.control.transport import there_and_back
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.compiled_poses import turn_between, turned
 from pipeline.gripper.pad import Pad
@@ -30,15 +31,6 @@ from pipeline.world.posed_bodies import PosedBodies, PosedScene
 _ARRIVED_M, _ARRIVED_RAD = 1e-4, 1e-3  # a motion has ended: under what a camera tells apart
 _LAG_M = 0.002  # an arm that is this near has arrived
 _LEVER_M = 0.2  # a turn counts as the way of a point this far from the axis
-
-
-def there_and_back(leg: float) -> float:
-    """Share of a way at a time in legs, each of full acceleration and then full braking.
-
-    leg : 0 at the start, 1 at the far end, from 2 on back at the start.
-    """
-    left = min(abs(leg - 1.0), 1.0)
-    return 1.0 - 2.0 * left**2 if left < 0.5 else 2.0 * (1.0 - left) ** 2
 
 
 class SuctionGripper:

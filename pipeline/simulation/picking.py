@@ -11,7 +11,8 @@ from pipeline.config.evaluation import PolicyName
 from pipeline.control.attempts import JudgedAttempt, LoggedEyes, SeenPicture
 from pipeline.control.decision import Cause, Decision, Strategy
 from pipeline.control.policy import Attempt
-from pipeline.control.ranking import GeometricRanking, NetworkRanking, Predict
+from pipeline.control.ranking import Predict
+from pipeline.control.strategies import build_strategy
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.gripper.pad import build_pad
 from pipeline.physics.engine import Body, add_body, new_world
@@ -24,53 +25,6 @@ from pipeline.world.scene import ClutterScene
 
 _COLOUR = (0.5, 0.5, 0.5)  # no picture is rendered in this world
 _GONE_M = -0.05  # an object whose centre is lower than this has left the table
-
-
-def build_strategy(name: PolicyName, predict: Predict, config: RunConfig) -> Strategy:
-    """Build one of the policies that are compared.
-
-    - closed-loop: takes several views, corrects its aim on the way, and reacts to the wrench.
-    - uncorrected: the same without corrections.
-    - one-seal: the same as closed-loop without a second seal.
-    - open-loop: executes what the network rates best on the first picture.
-    - geometric: executes the flattest place for the pad at the highest point, of as many views as
-      the closed loop has.
-
-    Each but one-seal may seal as often in an attempt.
-
-    Parameters
-    ----------
-    name
-        Name of the policy.
-    predict
-        Network that rates grasps; the geometric policy does not use it.
-    config
-        The run.
-
-    Returns
-    -------
-    The policy.
-    """
-    network = NetworkRanking(
-        predict,
-        config.sensing,
-        config.gripper.pad.radius_m,
-        config.evaluate.policy,
-    )
-    if name == "geometric":
-        picker = GeometricRanking(config.evaluate.policy.picker, config.sensing, config.gripper.pad)
-        return Strategy(
-            name, picker, several_views=True, corrects=False, seals_again=True, feels=False
-        )
-    loop = name != "open-loop"
-    return Strategy(
-        name,
-        network,
-        several_views=loop,
-        corrects=loop and name != "uncorrected",
-        seals_again=name != "one-seal",
-        feels=loop,
-    )
 
 
 def build_mover(world: sapien.Scene, config: RunConfig) -> Mover:

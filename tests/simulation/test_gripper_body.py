@@ -15,10 +15,11 @@ from pipeline.config.evaluation import (
     SuctionConfig,
 )
 from pipeline.control.robot import Reading
+from pipeline.control.transport import there_and_back
 from pipeline.control.wrench_monitor import hanging_n
 from pipeline.gripper.pad import build_pad
 from pipeline.physics.engine import add_body, new_world
-from pipeline.simulation.gripper_body import SuctionGripper, there_and_back
+from pipeline.simulation.gripper_body import SuctionGripper
 from pipeline.simulation.iiwa14 import flange_from_gripper
 from pipeline.simulation.picking import build_mover
 from tests.bodies import catalogue_object, pose_at

@@ -6,7 +6,8 @@ import pytest
 from pipeline.config import RunConfig
 from pipeline.control.decision import Cause
 from pipeline.control.ranking import Predict
-from pipeline.simulation.picking import Clutter, build_strategy
+from pipeline.control.strategies import build_strategy
+from pipeline.simulation.picking import Clutter
 from pipeline.simulation.scenarios import SCENARIOS, make_trials, with_segmentation
 
 BY_NAME = {scenario.name: scenario for scenario in SCENARIOS}
