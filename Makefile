@@ -29,7 +29,7 @@ ifeq (,$(strip $(WORKERS)))
 unexport WORKERS
 endif
 
-.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee holdout folds release review report export predict real calibrate live docs lint fuzz regress plan list prune seal unseal clean FORCE
+.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee holdout folds release review report export predict real calibrate live robot board docs lint fuzz regress plan list prune seal unseal clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -171,6 +171,13 @@ calibrate: .venv/.ready  ## from which q-hat on RUN's network (or NETWORK) is ri
 live: .venv/.ready  ## grasps on every depth picture of a bag in recorded time: BAG=file.mcap [topic=/depth ...]
 	@test -n "$(BAG)" || { echo "Give the bag: make live BAG=file.mcap"; exit 1; }
 	@$(PY) -m stages.live $(BAG) $(foreach option,topic depth-scale-m radius-mm tilt-deg out,$(if $($(subst -,_,$(option))),--$(option) "$($(subst -,_,$(option)))"))
+
+robot: .venv/.ready  ## attempts on a robot: DRIVER=file.py CALIBRATION=file.json [attempts=10 ...], to runs/<run>/robot
+	@test -n "$(DRIVER)" -a -n "$(CALIBRATION)" || { echo "Give both: make robot DRIVER=my_robot.py CALIBRATION=cell.json"; exit 1; }
+	@$(PY) -m stages.robot $(DRIVER) $(CALIBRATION) $(foreach option,attempts radius-mm policy out,$(if $($(subst -,_,$(option))),--$(option) "$($(subst -,_,$(option)))"))
+
+board: .venv/.ready  ## a board to print; with POSES=file.json CALIBRATION=file.json the residue of hand-eye, to runs/<run>/board
+	@$(PY) -m stages.board runs/$(RUN)/board $(if $(POSES),--poses "$(POSES)") $(if $(CALIBRATION),--calibration "$(CALIBRATION)") $(if $(square_mm),--square-mm "$(square_mm)")
 
 docs: .venv/.ready  ## the pages and a reference of every module as a site, to runs/docs
 	@$(PY) -m stages.docs

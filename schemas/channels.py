@@ -137,7 +137,7 @@ CHANNELS = (
     Channel(
         "/attempts",
         ("softgrip.v1.Attempt",),
-        "One attempt of a policy: choice, path, wrench, outcome",
+        "One attempt of a policy: choice, path, wrench, pictures, outcome",
         f"{SI}; forces N, torques N m in GCS; world frame",
     ),
     Channel(

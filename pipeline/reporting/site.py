@@ -22,6 +22,7 @@ PAGES = {  # page of the repository → file of the site
     "README.md": "index.html",
     "pipeline/README.md": "science.html",
     "runs/FIRST_HOUR.md": "first_hour.html",
+    "runs/ON_YOUR_ROBOT.md": "robot.html",
     "runs/README.md": "running.html",
     "stages/README.md": "stages.html",
     "schemas/README.md": "files.html",

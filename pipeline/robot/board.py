@@ -23,7 +23,7 @@ from pipeline.world.cameras import PIXEL_CENTRE_PX, PinholeCamera
 DICTIONARY = cv2.aruco.DICT_5X5_100
 MARKER_SHARE = 0.75  # of a square's side
 FEWEST_CORNERS = 8  # of a picture: fewer give no pose that can be trusted
-FEWEST_PICTURES = 5
+FEWEST_PICTURES = 5  # hand-eye and the board have 12 unknowns, a picture says 6
 # The arm must turn about axes this far apart between pictures, or hand-eye is not determined.
 LEAST_TURN_RAD, LEAST_BETWEEN_AXES_RAD = np.radians(10.0), np.radians(10.0)
 MM_AN_INCH = 25.4
@@ -128,10 +128,10 @@ def camera_from_board(
             f"{name} shows {found} corners of the board, and {FEWEST_CORNERS} are needed",
             "Light it well, hold the camera still, and check columns, rows and the print",
         )
-    on_board, in_picture = board.matchImagePoints(corners, ids)
+    on_board = np.asarray(board.getChessboardCorners())[np.ravel(ids)]
     k = camera.intrinsics.copy()
     k[:2, 2] -= PIXEL_CENTRE_PX  # OpenCV's pixel centres
-    _, turn, move = cv2.solvePnP(on_board, in_picture, k, None, flags=cv2.SOLVEPNP_ITERATIVE)
+    _, turn, move = cv2.solvePnP(on_board, corners, k, None, flags=cv2.SOLVEPNP_ITERATIVE)
     pose = np.eye(4)
     pose[:3, :3] = cv2.Rodrigues(turn)[0]
     pose[:3, 3] = move.ravel()

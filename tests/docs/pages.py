@@ -8,6 +8,7 @@ PAGES = (
     "README.md",
     "pipeline/README.md",
     "runs/FIRST_HOUR.md",
+    "runs/ON_YOUR_ROBOT.md",
     "runs/README.md",
     "schemas/README.md",
     "stages/README.md",
@@ -38,6 +39,14 @@ REDUCED = {
     "make live BAG=drive.mcap": (
         "make -n live BAG=drive.mcap",
         "tests/stages/test_live.py runs it on a bag of its own",
+    ),
+    "make robot DRIVER=my_robot.py CALIBRATION=cell.json attempts=20": (
+        "make -n robot DRIVER=my_robot.py CALIBRATION=cell.json attempts=20",
+        "it needs a robot; tests/robot/test_robot.py runs it on a fake one",
+    ),
+    "make board RUN=ci POSES=board/poses.json CALIBRATION=board/cell.json square_mm=30": (
+        "make -n board RUN=ci POSES=board/poses.json CALIBRATION=board/cell.json square_mm=30",
+        "it needs pictures; tests/robot/test_board.py draws some",
     ),
     "make calibrate RUN=ci": (
         "make -n calibrate RUN=ci",

@@ -59,7 +59,8 @@ class World:
         self.rng = np.random.default_rng(1)
 
     def pad(self) -> np.ndarray:
-        return self.world_from_base @ flange_pose(self.q_rad) @ self.flange_from_gripper
+        flange = flange_pose(self.q_rad)
+        return np.asarray(self.world_from_base @ flange @ self.flange_from_gripper)
 
     def push_n(self) -> np.ndarray:
         """What a surface pushes the pad with, in the world."""
@@ -129,7 +130,7 @@ class Arm:
             load = turn @ (WORLD.held.mass_kg * down)
             lever = turn @ (WORLD.held.centre_m - world_from_flange[:3, 3])
             total += np.concatenate([load, np.cross(lever, load)])
-        return total + WORLD.bias + WORLD.noise_n * WORLD.rng.normal(size=6)
+        return np.asarray(total + WORLD.bias + WORLD.noise_n * WORLD.rng.normal(size=6))
 
     def set_output(self, pin: int, on: bool) -> None:
         WORLD.sucks = on
