@@ -102,7 +102,9 @@ class SuctionJoint:
         force = self.item.mass_kg * (stiff * error - damp * linear - _GRAVITY)
         inertia = now[:3, :3] @ self.item.inertia_kg_m2 @ now[:3, :3].T
         torque = inertia @ (stiff * turn - damp * angular)
-        arm = now[:3, 3] - world_from_gripper[:3, 3]
+        # The spring lets the object trail a fast pad by some centimetres; a real seal does not, so
+        # the lever is that of the object where it was sealed.
+        arm = wanted[:3, 3] - world_from_gripper[:3, 3]
         into_gripper = world_from_gripper[:3, :3].T
         load = -np.concatenate(
             [into_gripper @ force, into_gripper @ (torque + np.cross(arm, force))]
