@@ -4,6 +4,7 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from pipeline.config.imperfection import ImperfectionConfig
 from pipeline.config.policy import PolicyConfig
 from pipeline.config.section import LengthInMetres, ScaledSection, Section
 
@@ -161,6 +162,7 @@ class EvaluateConfig(Section):
     hand: HandConfig = HandConfig()
     arm: ArmConfig = ArmConfig()
     policy: PolicyConfig = PolicyConfig()
+    imperfection: ImperfectionConfig = ImperfectionConfig()
 
     @model_validator(mode="after")
     def _tug_is_part_of_the_lift(self) -> Self:

@@ -193,6 +193,12 @@ class PolicyConfig(ScaledSection):
     tension_min_n: float = Field(
         0.003, gt=0, description="least pull on the base that tells a held object: 0.3 g [N]"
     )
+    contact_sigmas: float = Field(
+        3.0, ge=0, description="a touch is at least so many spreads of a force that is read [1]"
+    )
+    tension_sigmas: float = Field(
+        1.0, ge=0, description="a pull is at least so many spreads of a force that is read [1]"
+    )
     slip_rg: float = Field(
         0.32, gt=0, description="shift of the load's line in one step that is a slip [r_G]"
     )

@@ -27,11 +27,14 @@ class DepthPicture:
     instances
         Which object each pixel shows by its colour, 0 for none; None where nothing segments the
         pictures.
+    age_s
+        From its exposure to the moment at which what it shows is acted upon [s].
     """
 
     depth_m: Float[np.ndarray, "h w"]
     camera: PinholeCamera
     instances: Integer[np.ndarray, "h w"] | None = None
+    age_s: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -122,6 +122,7 @@ class GlobalPhase:
         decision.pictures = pictures
         found = self._without_failed(self._sample(cloud))
         quality = self._ranking(pictures, found) if len(found) else np.empty(0)
+        self._robot.think()
         decision.candidates, decision.quality = found.world_from_contact, quality
         self._ranked = [
             *self._rank_free(cloud, found, quality, best_first=quality),
@@ -177,6 +178,7 @@ class GlobalPhase:
         if len(found) == 0:
             return None
         quality = self._ranking(pictures, found)
+        self._robot.think()
         worth = worth_with_lever(quality, found, place_m, lever_m, self._policy)
         nearer = worth > 0.0
         ranked = self._rank_free(
@@ -195,6 +197,7 @@ class GlobalPhase:
         """
         found = self._without_failed(self._sample(self._cloud(pictures)))
         quality = self._ranking(pictures, found) if len(found) else np.empty(0)
+        self._robot.think()
         places = found.world_from_contact[:, :3, 3]
         wanted = self._policy.wrist_views
         apart = choose_apart(places, quality, wanted, self._policy.look_apart_m)

@@ -45,18 +45,22 @@ class LocalPhase:
         return bool(self._motion.velocity_m_s.any())
 
     def look(self, picture: DepthPicture, aim: Pose) -> tuple[Pose, float] | None:
-        """The pose to aim at after a new picture, and its q-hat; None without any candidate."""
+        """The pose to aim at after a new picture, and its q-hat; None without any candidate.
+
+        The picture shows where an object in motion was at the exposure; the aim is where it is now.
+        """
         policy = self._config.policy
         cloud = merged_cloud([picture], policy.voxel_m, policy.above_table_m)
         self._motion.see(cloud.points_m, aim[:3, 3])
-        return correct_aim(
+        found = correct_aim(
             picture,
-            aim,
+            self._after(-picture.age_s, aim),
             self._ranking,
             self._config,
             self._normal_radius_m,
             self._rng,
         )
+        return None if found is None else (self._after(picture.age_s, found[0]), found[1])
 
     def predict_meeting(self, aim: Pose, here: Pose) -> Pose:
         """Where the aim will be when the pad, now at ``here``, reaches it."""

@@ -70,17 +70,19 @@ class Attempt:
         self._strategy = strategy
         self._config = config
         self._policy = config.policy
-        self._monitor = WrenchMonitor(config.policy)
+        self._monitor = WrenchMonitor(config.policy, config.imperfection.force_error_n)
         self._global = GlobalPhase(eyes, robot, strategy, config, normal_radius_m, rng, avoid_m)
         self._local = LocalPhase(strategy.ranking, config, normal_radius_m, rng)
         self._new_choices_left = config.policy.new_choices
         self._retargets_left = config.policy.retargets if strategy.corrects else 0
         self._regrasps_left = config.policy.regrasps if strategy.seals_again else 0
+        self._moment_error_nm = config.imperfection.moment_error_nm
         self._aim_unmeasured = False
         self.decision = Decision()
 
     def run(self) -> Decision:
         """Make the attempt, and return what was decided and why it ended."""
+        self._robot.tare()
         cause = self._run_phases(
             (State.OBSERVE, self._choose),
             *self._phases_to_seal(),
@@ -137,6 +139,7 @@ class Attempt:
         A moving object is followed only within the robot's reach and for at most
         ``approach_max_s``.
         """
+        self._robot.tare()
         for _ in range(round(self._policy.approach_max_s * self._policy.rate_hz)):
             aim = self.decision.world_from_contact
             here = self._robot.pose()
@@ -247,8 +250,9 @@ class Attempt:
             return False
         place = load_place_m(felt, self._config.hand.length_m)
         lever_m = float(np.linalg.norm(place - felt.world_from_gripper[:2, 3]))
-        if lever_m < self._policy.regrasp_lever_m:
-            return False  # it was held at its centre of mass: the seal itself is weak
+        error_m = self._moment_error_nm / hanging_n(felt)
+        if lever_m < max(self._policy.regrasp_lever_m, error_m):
+            return False  # it was held at its centre of mass, as far as is known: a weak seal
         if not self._aim_at(self._global.nearer_to(place, lever_m, self.decision.pictures)):
             return False
         self._retargets_left = 0  # a choice by the wrench is not changed by pictures
@@ -270,7 +274,9 @@ class Attempt:
             target = self._robot.pose()
             risen = target[2, 3] - start[2, 3]
             if reading is not None and left > 0 and risen >= self._policy.trim_from_m:
-                target, turned = trim_pose(target, reading.wrench, left, self._policy)
+                target, turned = trim_pose(
+                    target, reading.wrench, left, self._policy, self._moment_error_nm
+                )
                 left -= turned
             target[:2, 3], target[2, 3] = start[:2, 3], start[2, 3] + height_m
             reading = self._robot.step(target, speed_m_s)

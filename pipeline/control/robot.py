@@ -56,7 +56,11 @@ class Reading:
 
 
 class Eyes(Protocol):
-    """The cameras; a camera that has stopped returns None."""
+    """The cameras; a camera that has stopped returns None.
+
+    Pictures hold poses as they are calibrated, and nothing of the gripper itself:
+    `pipeline.control.own_body.cut_gripper_out`.
+    """
 
     def static(self) -> list[DepthPicture] | None:
         """One picture of every camera beside the table."""
@@ -76,6 +80,14 @@ class Robot(Protocol):
 
     def enter(self, state: State) -> None:
         """Receive the phase that begins now, for the recording."""
+        ...
+
+    def tare(self) -> None:
+        """Set the wrench to zero that is felt now, in free air."""
+        ...
+
+    def think(self) -> None:
+        """All candidates have been ranked: a simulated robot waits as long as that takes."""
         ...
 
     def pose(self) -> Float[np.ndarray, "4 4"]:

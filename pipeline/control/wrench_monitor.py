@@ -29,8 +29,20 @@ class Event(StrEnum):
 class WrenchMonitor:
     """Watches the readings of one attempt."""
 
-    def __init__(self, config: PolicyConfig) -> None:
+    def __init__(self, config: PolicyConfig, error_n: float = 0.0) -> None:
+        """Nothing was read yet.
+
+        Parameters
+        ----------
+        config
+            Thresholds.
+        error_n
+            Standard deviation of a force that is read, by the robot's data sheet [N]; less than so
+            many of it, as the configuration says, tells nothing.
+        """
         self._config = config
+        self._contact_n = max(config.contact_n, config.contact_sigmas * error_n)
+        self._tension_n = max(config.tension_min_n, config.tension_sigmas * error_n)
         self._line: Float[np.ndarray, " 3"] | None = None
 
     def moving(self, reading: Reading) -> Event:
@@ -39,13 +51,13 @@ class WrenchMonitor:
             return Event.COLLISION
         if not reading.followed:
             return Event.BLOCKED
-        if reading.wrench[2] > self._config.contact_n:
+        if reading.wrench[2] > self._contact_n:
             return Event.CONTACT
         return Event.NOTHING
 
     def holds(self, reading: Reading) -> bool:
         """Whether an object hangs on the gripper: its pull shows the seal (grasp success)."""
-        return hanging_n(reading) >= self._config.tension_min_n
+        return hanging_n(reading) >= self._tension_n
 
     def carrying(self, reading: Reading) -> Event:
         """The event of a reading while an object is held: lost, or slipped under the pad."""
@@ -73,6 +85,7 @@ def trim_pose(
     wrench: Float[np.ndarray, " 6"],
     left_rad: float,
     config: PolicyConfig,
+    error_nm: float = 0.0,
 ) -> tuple[Float[np.ndarray, "4 4"], float]:
     """Turn the pose about the pad so that the moment at the base becomes smaller.
 
@@ -90,6 +103,8 @@ def trim_pose(
         Largest angle that it may turn by [rad].
     config
         Moment below which nothing is done, lever, and largest step.
+    error_nm
+        Standard deviation of a moment that is read [N m]; a smaller one is not acted upon.
 
     Returns
     -------
@@ -98,7 +113,7 @@ def trim_pose(
     force = wrench[:3]
     moment = wrench[3:] * [1.0, 1.0, 0.0]
     size = float(np.linalg.norm(moment))
-    if size < config.trim_moment_nm:
+    if size < max(config.trim_moment_nm, error_nm):
         return world_from_gripper, 0.0
     aside_m = size / max(float(np.linalg.norm(force)), 1e-9)
     angle = min(aside_m / config.trim_lever_m, config.trim_step_rad, left_rad)

@@ -1,63 +1,111 @@
-"""The cameras of the closed loop: beside the table, and on the wrist."""
+"""The cameras of the closed loop: beside the table, and on the wrist.
 
-from collections.abc import Callable, Mapping
+Pictures come late: they show the world as it was at their exposure. On an imperfect robot they are
+taken from where the cameras truly are, and carry the pose that the calibration believes in.
+"""
+
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
+import trimesh
 from jaxtyping import Float
 
 from pipeline.config import RunConfig
 from pipeline.config.evaluation import HandConfig
+from pipeline.config.grasps import PadConfig
 from pipeline.control.cloud import DepthPicture
+from pipeline.control.own_body import cut_gripper_out
 from pipeline.geometry.catalogue import CatalogueObject
+from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.transforms import look_at
-from pipeline.physics.engine import Body
 from pipeline.sensing.depth_by_rays import measure_depth, window_around
+from pipeline.simulation.imperfection import Calibration
 from pipeline.world.cameras import PinholeCamera, camera_at, static_cameras
 from pipeline.world.posed_bodies import PosedBodies
 
 _ORIGIN = np.zeros(3)  # the wrist camera gets its pose at every picture
+_SECTIONS = 48  # sides of the gripper's outline in pictures: finer than a pixel
+Pose = Float[np.ndarray, "4 4"]
+
+
+class Seen(Protocol):
+    """What pictures are taken of: the gripper and the bodies, now and a while ago."""
+
+    def state_before(self, age_s: float) -> tuple[Pose, dict[int, Pose]]:
+        """Pose of the gripper, and of each body by its id, so long ago [s]."""
+        ...
+
+    def wait(self, time_s: float) -> None:
+        """Let simulated time pass while the gripper stands still [s]."""
+        ...
 
 
 class SimulatedEyes:
     """The cameras of the closed loop as `pipeline.control.robot.Eyes`, with the sensors' noise.
 
-    Pictures show the table and the bodies where they are at that moment. They do not show the
-    gripper: a real robot would cut its own gripper out of the wrist camera's picture, and the
-    static cameras take their pictures while the gripper is at home.
+    On an imperfect robot pictures also show the gripper, which hides what is behind it. What was
+    measured of it is cut out, by the pose that the robot believes in. An arm's links are not shown.
     """
 
     def __init__(
         self,
-        bodies: dict[int, Body],
+        seen: Seen,
         objects: Mapping[int, CatalogueObject],
-        gripper_pose: Callable[[], Float[np.ndarray, "4 4"]],
         config: RunConfig,
+        calibration: Calibration,
         rng: np.random.Generator,
     ) -> None:
-        self._bodies = bodies
-        self._gripper_pose = gripper_pose
+        """Place the cameras; no picture is taken yet.
+
+        Parameters
+        ----------
+        seen
+            Tells where the gripper and the bodies are and were.
+        objects
+            Catalogue entry of each body.
+        config
+            The run.
+        calibration
+            Errors of the cameras' poses.
+        rng
+            Draws the sensors' noise.
+        """
+        self._seen = seen
         self._config = config
+        self._imperfection = config.evaluate.imperfection
+        self._calibration = calibration
         self._rng = rng if config.sensing.disturbed else None
-        self._surfaces = PosedBodies(
-            {i: item.mesh for i, item in objects.items()}, config.scenes.table_side_m
-        )
+        meshes = {i: item.mesh for i, item in objects.items()}
+        self._own_id = max(meshes, default=0) + 1
+        meshes[self._own_id] = gripper_mesh(config.evaluate.hand, config.gripper.pad)
+        self._surfaces = PosedBodies(meshes, config.scenes.table_side_m)
         self._transparent = {i for i, item in objects.items() if item.material == "transparent"}
         self._beside = static_cameras(config.cameras.static)
         self._on_wrist = camera_at("wrist", config.cameras.wrist, _ORIGIN, 1.0, 0.0, 0.0)
         self._gripper_from_camera = gripper_from_camera(config.evaluate.hand)
 
     def static(self) -> list[DepthPicture] | None:
-        """One depth picture from each camera beside the table."""
-        return [self._taken(camera) for camera in self._beside]
+        """One depth picture from each camera beside the table; the gripper waits for them."""
+        gripper, bodies = self._seen.state_before(0.0)
+        pictures = [
+            self._taken(camera, error, gripper, bodies, 0.0)
+            for camera, error in zip(self._beside, self._calibration.beside, strict=True)
+        ]
+        self._seen.wait(self._imperfection.scale * self._imperfection.latency_s)
+        return pictures
 
-    def wrist_camera(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> PinholeCamera:
-        """The wrist camera as it stands when the gripper has this pose."""
-        pose = world_from_gripper @ self._gripper_from_camera
+    def wrist_camera(self, world_from_gripper: Pose) -> PinholeCamera:
+        """The wrist camera as the robot believes it stands when the gripper has this pose."""
+        pose = world_from_gripper @ self._gripper_from_camera @ self._calibration.hand_eye
         return place_camera(self._on_wrist, pose)
 
     def wrist(self, around_m: Float[np.ndarray, " 3"], radius_m: float) -> DepthPicture | None:
         """Take the part of the wrist camera's picture that shows a sphere.
+
+        It was exposed a while ago, as much as the picture takes to arrive and the policy to use it;
+        the gripper has gone on meanwhile.
 
         Parameters
         ----------
@@ -70,20 +118,61 @@ class SimulatedEyes:
         -------
         The picture, with a camera that describes this part only.
         """
-        camera = self.wrist_camera(self._gripper_pose())
-        return self._taken(window_around(camera, around_m, radius_m))
+        age_s = self._imperfection.picture_age_s
+        gripper, bodies = self._seen.state_before(age_s)
+        window = window_around(self.wrist_camera(gripper), around_m, radius_m)
+        true_pose = gripper @ self._gripper_from_camera
+        camera = place_camera(window, true_pose)
+        return self._taken(camera, self._calibration.hand_eye, gripper, bodies, age_s)
 
-    def _taken(self, camera: PinholeCamera) -> DepthPicture:
-        """One picture of the bodies where they are now."""
-        poses = {i: body.world_from_object for i, body in self._bodies.items()}
+    def _taken(
+        self,
+        camera: PinholeCamera,
+        error: Pose,
+        gripper: Pose,
+        bodies: Mapping[int, Pose],
+        age_s: float,
+    ) -> DepthPicture:
+        """A picture from the true pose of a camera, with the pose that the robot believes in."""
+        poses = dict(bodies)
+        shows_gripper = self._imperfection.scale > 0.0
+        if shows_gripper:
+            poses[self._own_id] = gripper
         opaque = None
         if not self._transparent.isdisjoint(poses):
             opaque = self._surfaces.at(
                 {i: pose for i, pose in poses.items() if i not in self._transparent}
             )
-        depth_m, bodies = measure_depth(camera, self._surfaces.at(poses), opaque, self._rng)
+        depth_m, shown = measure_depth(camera, self._surfaces.at(poses), opaque, self._rng)
         segmented = self._config.evaluate.segmentation == "ideal"
-        return DepthPicture(depth_m, camera, bodies if segmented else None)
+        instances = (
+            np.where(shown == self._own_id, shown.dtype.type(0), shown) if segmented else None
+        )
+        if not shows_gripper:
+            return DepthPicture(depth_m, camera, instances)
+        believed = place_camera(camera, camera.world_from_camera @ error)
+        return cut_gripper_out(
+            DepthPicture(depth_m, believed, instances, age_s),
+            gripper,
+            self._config.evaluate.hand,
+            self._config.gripper.pad,
+            self._imperfection.own_margin_m,
+        )
+
+
+def gripper_mesh(hand: HandConfig, pad: PadConfig) -> Mesh:
+    """The pad and the stem above it as two cylinders in GCS."""
+    parts = [
+        trimesh.creation.cylinder(
+            radius, segment=[[0.0, 0.0, low], [0.0, 0.0, high]], sections=_SECTIONS
+        )
+        for radius, low, high in (
+            (pad.radius_m, 0.0, pad.altitude_m),
+            (hand.stem_radius_m, pad.altitude_m, hand.length_m),
+        )
+    ]
+    both = trimesh.util.concatenate(parts)
+    return Mesh(np.asarray(both.vertices, np.float64), np.asarray(both.faces, np.int64))
 
 
 def gripper_from_camera(hand: HandConfig) -> Float[np.ndarray, "4 4"]:

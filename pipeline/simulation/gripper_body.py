@@ -6,6 +6,7 @@ touches the true surfaces.
 """
 
 import math
+from bisect import bisect_left
 from collections.abc import Mapping
 
 import numpy as np
@@ -23,14 +24,29 @@ from pipeline.labelling.heights import pad_heights
 from pipeline.labelling.poses import label_poses
 from pipeline.physics.engine import Body
 from pipeline.simulation.floating import Mover
+from pipeline.simulation.imperfection import WrenchSensor
 from pipeline.simulation.judges import build_judge
-from pipeline.simulation.payload import loads_of_a_kilogram, way_inwards, weight_borne_n
+from pipeline.simulation.payload import (
+    GRAVITY_M_S2,
+    loads_of_a_kilogram,
+    way_inwards,
+    weight_borne_n,
+)
 from pipeline.simulation.suction_joint import SuctionJoint
 from pipeline.world.posed_bodies import PosedBodies, PosedScene
 
 _ARRIVED_M, _ARRIVED_RAD = 1e-4, 1e-3  # a motion has ended: under what a camera tells apart
 _LAG_M = 0.002  # an arm that is this near has arrived
 _LEVER_M = 0.2  # a turn counts as the way of a point this far from the axis
+
+
+def pose_between(
+    first: Float[np.ndarray, "4 4"], second: Float[np.ndarray, "4 4"], share: float
+) -> Float[np.ndarray, "4 4"]:
+    """A pose at a share of the way from one pose to another: 0 is the first, 1 the second."""
+    pose = turned(first, share * turn_between(first, second))
+    pose[:3, 3] += share * (second[:3, 3] - first[:3, 3])
+    return np.asarray(pose)
 
 
 class SuctionGripper:
@@ -44,6 +60,7 @@ class SuctionGripper:
         pad: Pad,
         config: RunConfig,
         mover: Mover,
+        sensor: WrenchSensor | None = None,
     ) -> None:
         """Place the gripper at home, holding nothing.
 
@@ -62,8 +79,11 @@ class SuctionGripper:
             Sections gripper, scenes and evaluate.
         mover
             The stem or the arm that carries the gripper.
+        sensor
+            Reads the wrench; None reads it without an error.
         """
         self._world = world
+        self._sensor = sensor
         self._bodies = bodies
         self._objects = objects
         self._pad = pad
@@ -102,6 +122,50 @@ class SuctionGripper:
         """Measured pose world_from_gripper, shape (4, 4)."""
         return self._mover.pose()
 
+    def tare(self) -> None:
+        """Set the wrench that is felt now, without a load, to zero."""
+        if self._sensor is not None:
+            self._sensor.tare()
+
+    def think(self) -> None:
+        """Wait as long as the policy takes to rank all candidates."""
+        imperfection = self._config.evaluate.imperfection
+        self.wait(imperfection.scale * imperfection.choice_s)
+
+    def wait(self, time_s: float) -> None:
+        """Stand still while simulated time passes [s], to the nearest step of physics."""
+        steps = round(time_s / self._world.timestep)
+        for number in range(1, steps + 1):
+            load, _ = self._physics_step()
+            if number % self._steps == 0 or number == steps:
+                self._sample(self._felt(load, self._error()))
+
+    def state_before(
+        self, age_s: float
+    ) -> tuple[Float[np.ndarray, "4 4"], dict[int, Float[np.ndarray, "4 4"]]]:
+        """Where the gripper and the bodies were a while ago, on a straight way between samples.
+
+        Parameters
+        ----------
+        age_s
+            How long ago [s]; the beginning of the attempt where that is later.
+
+        Returns
+        -------
+        world_from_gripper, shape (4, 4), and the pose of each body by body id.
+        """
+        if age_s <= 0.0:
+            return self.pose(), {i: body.world_from_object for i, body in self._bodies.items()}
+        times = [sample.time_s for sample in self.samples]
+        after = min(bisect_left(times, self.time_s - age_s), len(times) - 1)
+        a, b = self.samples[max(after - 1, 0)], self.samples[after]
+        span_s = b.time_s - a.time_s
+        share = min(max((self.time_s - age_s - a.time_s) / span_s, 0.0), 1.0) if span_s else 1.0
+        return pose_between(a.world_from_gripper, b.world_from_gripper, share), {
+            i: pose_between(a.world_from_object[i], b.world_from_object[i], share)
+            for i in self._bodies
+        }
+
     def reachable(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> bool:
         """Whether the mover can bring the gripper to this pose."""
         return self._mover.reachable(world_from_gripper)
@@ -121,16 +185,17 @@ class SuctionGripper:
         Pose, wrench and the events of this period.
         """
         target, touches = self._stopped_by_touch(world_from_gripper, speed_m_s)
-        loads, peak_n = [], 0.0
+        loads, peaks = [], [np.zeros(3)]
         for _ in range(self._steps):
             self._advance(target, speed_m_s)
-            load, push_n = self._physics_step()
+            load, push = self._physics_step()
             loads.append(load)
-            peak_n = max(peak_n, push_n)
+            peaks.append(push)
+        peak = max(peaks, key=lambda push: float(np.linalg.norm(push)))
         touched = touches and self._at(target)
         if touched:
             self._speed_m_s = 0.0
-        return self._reading(np.mean(loads, axis=0), peak_n, self._at(world_from_gripper), touched)
+        return self._reading(np.mean(loads, axis=0), peak, self._at(world_from_gripper), touched)
 
     def vacuum(self, on: bool) -> None:
         """Switch the vacuum.
@@ -178,13 +243,15 @@ class SuctionGripper:
             self._goal[0, 3] += lift.shake_m * np.sin(phase)
             load, _ = self._physics_step()
             if number % self._steps == 0:
-                self._sample(self._at_base(load))
+                self._sample(self._felt(load, self._error()))
         self._goal, loads = centre, []
         for number in range(1, round(lift.hold_s / self._world.timestep) + 1):
             loads.append(self._physics_step()[0])
             if number % self._steps == 0:
-                self._sample(self._at_base(loads[-1]))
-        return self._reading(np.mean(loads[-self._steps :], axis=0), 0.0, True, touched=False)
+                self._sample(self._felt(loads[-1], self._error()))
+        return self._reading(
+            np.mean(loads[-self._steps :], axis=0), np.zeros(3), True, touched=False
+        )
 
     def carry(self, acceleration_m_s2: float) -> Reading:
         """Aside and back at an acceleration, braking as hard; the wrench is the mean while still.
@@ -201,8 +268,10 @@ class SuctionGripper:
             self._goal[:3, 3] += there_and_back(number * dt / leg_s) * aside_m
             loads.append(self._physics_step()[0])
             if number % self._steps == 0:
-                self._sample(self._at_base(loads[-1]))
-        return self._reading(np.mean(loads[-self._steps :], axis=0), 0.0, True, touched=False)
+                self._sample(self._felt(loads[-1], self._error()))
+        return self._reading(
+            np.mean(loads[-self._steps :], axis=0), np.zeros(3), True, touched=False
+        )
 
     def _way_aside_m(self) -> Float[np.ndarray, " 3"]:
         """A level way that the mover can go, as long as the configuration's where possible."""
@@ -286,8 +355,8 @@ class SuctionGripper:
         self._goal = turned(self._goal, share * turn)
         self._goal[:3, 3] += share * way
 
-    def _physics_step(self) -> tuple[Float[np.ndarray, " 6"], float]:
-        """Step the world once; load on the pad in GCS, and force on the rigid parts [N]."""
+    def _physics_step(self) -> tuple[Float[np.ndarray, " 6"], Float[np.ndarray, " 3"]]:
+        """Step the world once; load on the pad, and force on the rigid parts [N], both in GCS."""
         self._follows &= self._mover.drive(self._goal)
         load = np.zeros(6)
         if self._joint is not None:
@@ -300,21 +369,28 @@ class SuctionGripper:
         self.time_s += self._world.timestep
         push = self._push_on_rigid_parts()
         if push is None:
-            return load, 0.0
+            return load, np.zeros(3)
         into_gripper = self.pose()[:3, :3].T
-        load[:3] += into_gripper @ push[:3]
+        force = into_gripper @ push[:3]
+        load[:3] += force
         load[3:] += into_gripper @ push[3:]
-        return load, float(np.linalg.norm(push[:3]))
+        return load, np.asarray(force)
 
     def _convey(self) -> None:
-        """Give every body that is not held the conveyor's speed."""
+        """Give every body that is not held the conveyor's speed.
+
+        The table stands still and brakes by friction in the step of physics that follows; what that
+        takes is given beside the speed.
+        """
         if self.conveyor_m_s == 0.0:
             return
+        friction_m_s = self._config.scenes.friction * GRAVITY_M_S2 * self._world.timestep
+        speed_m_s = self.conveyor_m_s + math.copysign(friction_m_s, self.conveyor_m_s)
         held = self._joint.body if self._joint is not None else None
         for body in self._bodies.values():
             if body is not held:
                 falling = float(body.rigid.linear_velocity[2])
-                body.rigid.set_linear_velocity([self.conveyor_m_s, 0.0, falling])
+                body.rigid.set_linear_velocity([speed_m_s, 0.0, falling])
 
     def _push_on_rigid_parts(self) -> Float[np.ndarray, " 6"] | None:
         """Contact force [N], moment about the pad's centre [N m], in WCS; None without."""
@@ -332,15 +408,32 @@ class SuctionGripper:
         return total
 
     def _reading(
-        self, load: Float[np.ndarray, " 6"], peak_n: float, arrived: bool, touched: bool
+        self,
+        load: Float[np.ndarray, " 6"],
+        peak: Float[np.ndarray, " 3"],
+        arrived: bool,
+        touched: bool,
     ) -> Reading:
         """Record a sample and return what the robot reports for this period."""
         if touched:
             load = load + np.array([0.0, 0.0, self._config.evaluate.hand.touch_n, 0.0, 0.0, 0.0])
-        wrench = self._at_base(load)
+        error = self._error()
+        wrench = self._felt(load, error)
         self._sample(wrench)
         followed, self._follows = self._follows, True
+        peak_n = float(np.linalg.norm(peak if error is None else peak + error[:3]))
         return Reading(self.pose(), wrench, peak_n, arrived, followed, self._pressure())
+
+    def _error(self) -> Float[np.ndarray, " 6"] | None:
+        """What the wrench that is read next differs by from the truth; None: not at all."""
+        return None if self._sensor is None else self._sensor.error()
+
+    def _felt(
+        self, load: Float[np.ndarray, " 6"], error: Float[np.ndarray, " 6"] | None
+    ) -> Float[np.ndarray, " 6"]:
+        """The wrench at the flange that is read under a load at the pad's centre, shape (6,)."""
+        at_base = self._at_base(load)
+        return at_base if error is None else at_base + error
 
     def _at_base(self, load: Float[np.ndarray, " 6"]) -> Float[np.ndarray, " 6"]:
         """A load at the pad's centre, moved to the flange; axes stay those of GCS."""

@@ -20,6 +20,7 @@ from pipeline.simulation.arm import ArmMover
 from pipeline.simulation.eyes import SimulatedEyes
 from pipeline.simulation.floating import FloatingMover, Mover
 from pipeline.simulation.gripper_body import SuctionGripper
+from pipeline.simulation.imperfection import WrenchSensor, draw_calibration
 from pipeline.simulation.payload import GRAVITY_M_S2
 from pipeline.world.scene import ClutterScene
 
@@ -61,10 +62,18 @@ class Clutter:
             for p in scene.objects
         }
         mover = build_mover(self.world, config)
+        # The same errors for every policy at this clutter, and at every scale.
+        calibrated, felt = rng.spawn(2)
+        imperfection = config.evaluate.imperfection
+        beside = len(config.cameras.static.elevations_rad)
+        calibration = draw_calibration(imperfection, beside, calibrated)
+        pad, sensor = build_pad(config.gripper.pad), None
+        if imperfection.scale > 0.0:
+            sensor = WrenchSensor(imperfection, calibration.wrench_bias, felt)
         self.gripper = SuctionGripper(
-            self.world, self.bodies, self.items, build_pad(config.gripper.pad), config, mover
+            self.world, self.bodies, self.items, pad, config, mover, sensor
         )
-        self.eyes = SimulatedEyes(self.bodies, self.items, self.gripper.pose, config, rng)
+        self.eyes = SimulatedEyes(self.gripper, self.items, config, calibration, rng)
 
     def make_attempt(
         self, strategy: Strategy, avoid_m: list[Float[np.ndarray, " 3"]]

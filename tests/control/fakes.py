@@ -77,6 +77,12 @@ class FakeRobot:
         self.state = state
         self.states.append(state)
 
+    def tare(self) -> None:
+        pass
+
+    def think(self) -> None:
+        pass
+
     def pose(self) -> np.ndarray:
         return self._pose.copy()
 

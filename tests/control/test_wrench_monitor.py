@@ -33,6 +33,17 @@ def test_a_pull_is_a_seal_and_its_end_is_a_loss() -> None:
     assert monitor.carrying(reading(np.zeros(3))) is Event.LOSS
 
 
+def test_less_than_the_robot_can_tell_apart_is_no_touch_and_no_pull() -> None:
+    error_n = 0.5
+    monitor, sharp = WrenchMonitor(CONFIG, error_n), WrenchMonitor(CONFIG)
+    weak = np.array([0.0, 0.0, 0.9 * CONFIG.contact_sigmas * error_n])
+    assert sharp.moving(reading(weak)) is Event.CONTACT
+    assert monitor.moving(reading(weak)) is Event.NOTHING
+    light = np.array([0.0, 0.0, -0.9 * CONFIG.tension_sigmas * error_n])
+    assert sharp.holds(reading(light))
+    assert not monitor.holds(reading(light))
+
+
 def test_a_load_that_jumps_aside_has_slipped() -> None:
     monitor = WrenchMonitor(CONFIG)
     below = np.array([0.0, 0.0, -0.25])

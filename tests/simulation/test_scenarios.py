@@ -5,13 +5,12 @@ import pytest
 
 from pipeline.config import RunConfig
 from pipeline.control.decision import Cause
-from pipeline.control.ranking import Predict
 from pipeline.control.strategies import build_strategy
 from pipeline.simulation.picking import Clutter
 from pipeline.simulation.scenarios import SCENARIOS, make_trials, with_segmentation
 
 BY_NAME = {scenario.name: scenario for scenario in SCENARIOS}
-CONFIG = RunConfig()
+PERFECT = RunConfig.model_validate({"evaluate": {"imperfection": {"scale": 0.0}}})
 
 
 def flatness(cloud: np.ndarray, seen: np.ndarray) -> np.ndarray:
@@ -23,18 +22,19 @@ def flatness(cloud: np.ndarray, seen: np.ndarray) -> np.ndarray:
     return np.asarray(known * np.exp(-5 * spread))
 
 
-def tried(name: str, predict: Predict = flatness, seed: int = 0) -> tuple[Cause, Clutter]:
+def tried(name: str, config: RunConfig = PERFECT, seed: int = 0) -> tuple[Cause, Clutter]:
     rng = np.random.default_rng(seed)
     scenario = BY_NAME[name]
     scene, objects = next(make_trials(scenario, 1, 300.0, rng))
-    config = with_segmentation(CONFIG, scenario)
+    config = with_segmentation(config, scenario)
     clutter = Clutter(scene, objects, config, rng)
     clutter.gripper.conveyor_m_s = scenario.speed_m_s
-    return clutter.make_attempt(build_strategy("closed-loop", predict, config), []).cause, clutter
+    return clutter.make_attempt(build_strategy("closed-loop", flatness, config), []).cause, clutter
 
 
-def test_a_plain_box_is_lifted() -> None:
-    cause, clutter = tried("plain")
+@pytest.mark.parametrize("config", [PERFECT, RunConfig()], ids=["perfect", "imperfect"])
+def test_a_plain_box_is_lifted(config: RunConfig) -> None:
+    cause, clutter = tried("plain", config)
     assert cause is Cause.LIFTED
     assert clutter.bodies == {}
 
@@ -63,8 +63,8 @@ def test_a_box_that_falls_off_is_taken_out_and_named() -> None:
     """Carried over the table's edge while the pad goes for it: the attempt ends, not the run."""
     rng = np.random.default_rng(0)
     scene, objects = next(make_trials(BY_NAME["plain"], 1, 300.0, rng))
-    clutter = Clutter(scene, objects, CONFIG, rng)
+    clutter = Clutter(scene, objects, PERFECT, rng)
     clutter.gripper.conveyor_m_s = 0.8
-    cause = clutter.make_attempt(build_strategy("closed-loop", flatness, CONFIG), []).cause
+    cause = clutter.make_attempt(build_strategy("closed-loop", flatness, PERFECT), []).cause
     assert cause is not Cause.LIFTED
     assert clutter.bodies == {}
