@@ -116,8 +116,9 @@ bench: .venv/.ready  ## speed of labelling, QP, storage and control, to runs/ben
 	@$(MAKE) --no-print-directory scenes RUN=bench
 	@$(PY) -m stages.bench
 
-scenarios: .venv/.ready  ## failure modes of Supplement VIII with RUN's network, to runs/<run>/scenarios.md
-	@$(PY) -m stages.scenarios
+TRIALS ?= 10
+scenarios: .venv/.ready  ## failure modes of Supplement VIII, NETWORK=released|file, TRIALS=n, to runs/<run>/scenarios.md
+	@NETWORK="$(NETWORK)" TRIALS=$(TRIALS) $(PY) -m stages.scenarios
 
 referee: .venv/.ready  ## label, p and RUN's network against what the referee finds borne, to runs/<run>/referee
 	@$(PY) -m stages.referee prepare

@@ -159,6 +159,12 @@ CHANNELS = (
         "shares in [0, 1]; p values",
     ),
     Channel(
+        "/imperfection",
+        ("softgrip.v1.LevelResult",),
+        "Attempts and successes of one policy on all levels, by the scale of the robot's errors",
+        "counts; shares in [0, 1]; s a pick; scale dimensionless",
+    ),
+    Channel(
         "/networks",
         ("softgrip.v1.SweepNetwork",),
         "One network of the family that a study compares",

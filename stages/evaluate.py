@@ -23,13 +23,15 @@ from pipeline.execution import (
 )
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.messages.evaluation import attempt_message
+from pipeline.messages.evaluation_curve import curve_figures, curve_of, curve_scenes
 from pipeline.messages.evaluation_results import Results, results_of
 from pipeline.messages.objects import read_objects
 from pipeline.messages.scenes import read_scenes
 from pipeline.messages.training import EXPORT
 from pipeline.network.control_inference import ControlPredictor
 from pipeline.recording.evaluate import draw_evaluate
-from pipeline.recording.results import results_markdown
+from pipeline.recording.results import curve_markdown, results_markdown
+from pipeline.simulation.imperfection import with_imperfection
 from pipeline.simulation.picking import run_clutter
 from pipeline.world.scene import ClutterScene
 from schemas.softgrip.v1.evaluation_pb2 import Attempt, Comparison, LevelResult
@@ -49,20 +51,32 @@ class ClutterJob:
     network: Path
     config: RunConfig
     provenance: Provenance
+    scale: float
 
 
 def build(stage: StageContext) -> Summary:
     """Pick the clutters of a split empty in closed loop; success is judged by physics."""
     scenes = clutters(stage)
-    jobs = clutter_jobs(stage, scenes)
-    done = run_in_order(pick_clutter, jobs, stage.workers, stage.executor)
-    parts = list(progress(done, len(jobs), "evaluate: clutters", "clutter"))
-    attempts = [message for part in parts for message in read_attempts(part)]
     wanted = stage.config.evaluate
-    results = results_of(scenes, wanted.policies, attempts, wanted.transport.accelerations_m_s2)
-    publish(stage, attempts, results)
+    robot, accelerations = wanted.imperfection, wanted.transport.accelerations_m_s2
+    some = curve_scenes(scenes, robot.curve_clutters)
+    contest = clutter_jobs(stage, scenes, wanted.policies, robot.scale)
+    curve = {scale: clutter_jobs(stage, some, robot.curve_policies, scale) for scale in robot.curve}
+    # A policy, a clutter and a scale that both ask for are one job.
+    jobs = {job.path: job for part in (contest, *curve.values()) for job in part}
+    done = run_in_order(pick_clutter, list(jobs.values()), stage.workers, stage.executor)
+    list(progress(done, len(jobs), "evaluate: clutters", "clutter"))
+    attempts = attempts_of(contest)
+    results = results_of(scenes, wanted.policies, attempts, accelerations)
+    points = curve_of(
+        some,
+        robot.curve_policies,
+        {scale: attempts_of(part) for scale, part in curve.items()},
+        accelerations,
+    )
+    publish(stage, attempts, results, points)
     shutil.rmtree(stage.folder.state("evaluate"))
-    return results.summary()
+    return {**results.summary(), "imperfection": curve_figures(points)}
 
 
 def clutters(stage: StageContext) -> list[ClutterScene]:
@@ -77,20 +91,26 @@ def clutters(stage: StageContext) -> list[ClutterScene]:
     return scenes
 
 
-def clutter_jobs(stage: StageContext, scenes: list[ClutterScene]) -> list[ClutterJob]:
-    """Every policy at every clutter."""
+def clutter_jobs(
+    stage: StageContext,
+    scenes: list[ClutterScene],
+    policies: tuple[PolicyName, ...],
+    scale: float,
+) -> list[ClutterJob]:
+    """Every policy at every clutter, on a robot whose errors have this scale."""
     return [
         ClutterJob(
             scene=scene,
             policy=policy,
-            path=stage.folder.state("evaluate") / f"{scene.scene_id}.{policy}.mcap",
+            path=stage.folder.state("evaluate") / f"{scene.scene_id}.{policy}.{scale:g}.mcap",
             objects=stage.upstream("objects"),
             network=stage.inputs.get(GIVEN_NETWORK) or stage.upstream("train"),
             config=stage.config,
             provenance=stage.provenance(),
+            scale=scale,
         )
         for scene in scenes
-        for policy in stage.config.evaluate.policies
+        for policy in policies
     ]
 
 
@@ -101,7 +121,8 @@ def pick_clutter(job: ClutterJob) -> Path:
     objects = {name: item for name, (item, _) in catalogue(job.objects).items()}
     score = network(job.network).predict
     rng = generator(job.config.seed, "evaluate", job.scene.scene_id)
-    made = run_clutter(job.scene, objects, job.policy, score, job.config, rng)
+    config = with_imperfection(job.config, job.scale)
+    made = run_clutter(job.scene, objects, job.policy, score, config, rng)
     scene = job.scene
     with ArtifactWriter(job.path, job.provenance) as artifact:
         for number, attempt in enumerate(made):
@@ -134,13 +155,18 @@ def network(path: Path) -> ControlPredictor:
         return ControlPredictor(artifact.attachment(EXPORT), SCORE_THREADS)
 
 
-def read_attempts(path: Path) -> list[Attempt]:
-    """All attempts of a file."""
-    with open_artifact(path) as artifact:
-        return [message for _, message in artifact.messages(Attempt)]
+def attempts_of(jobs: list[ClutterJob]) -> list[Attempt]:
+    """All attempts of jobs that are done, in their order."""
+    found: list[Attempt] = []
+    for job in jobs:
+        with open_artifact(job.path) as artifact:
+            found += [message for _, message in artifact.messages(Attempt)]
+    return found
 
 
-def publish(stage: StageContext, attempts: list[Attempt], results: Results) -> None:
+def publish(
+    stage: StageContext, attempts: list[Attempt], results: Results, curve: list[LevelResult]
+) -> None:
     """Write the artifact."""
     with ArtifactWriter(stage.output, stage.provenance()) as artifact:
         for number, message in enumerate(attempts):
@@ -151,6 +177,8 @@ def publish(stage: StageContext, attempts: list[Attempt], results: Results) -> N
             artifact.write("/policies", result, log_time_ns=number)
         for number, comparison in enumerate(results.comparisons):
             artifact.write("/comparisons", comparison, log_time_ns=number)
+        for number, result in enumerate(curve):
+            artifact.write("/imperfection", result, log_time_ns=number)
 
 
 def print_table(folder: RunFolder) -> None:
@@ -159,7 +187,8 @@ def print_table(folder: RunFolder) -> None:
         levels = [message for _, message in artifact.messages(LevelResult, "/levels")]
         policies = [message for _, message in artifact.messages(LevelResult, "/policies")]
         comparisons = [message for _, message in artifact.messages(Comparison)]
-    sys.stdout.write(results_markdown(levels, policies, comparisons))
+        curve = [message for _, message in artifact.messages(LevelResult, "/imperfection")]
+    sys.stdout.write(results_markdown(levels, policies, comparisons) + curve_markdown(curve))
 
 
 if __name__ == "__main__":

@@ -5,11 +5,11 @@ from typing import ClassVar, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from pipeline.config.imperfection import ImperfectionConfig
+from pipeline.config.imperfection import PolicyName as PolicyName
 from pipeline.config.policy import PolicyConfig
 from pipeline.config.section import LengthInMetres, ScaledSection, Section
 
 RobotName = Literal["floating", "iiwa14"]
-PolicyName = Literal["closed-loop", "uncorrected", "one-seal", "open-loop", "geometric"]
 
 
 class SuctionConfig(Section):

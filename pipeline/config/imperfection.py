@@ -6,10 +6,13 @@ multiplied by `scale`.
 """
 
 import math
+from typing import Literal
 
 from pydantic import Field, field_validator
 
 from pipeline.config.section import Section
+
+PolicyName = Literal["closed-loop", "uncorrected", "one-seal", "open-loop", "geometric"]
 
 
 class ImperfectionConfig(Section):
@@ -95,6 +98,9 @@ class ImperfectionConfig(Section):
         description="scales at which success is compared beside the contest; () is none [1]",
     )
     curve_clutters: int = Field(1, ge=1, le=100, description="clutters a level for that")
+    curve_policies: tuple[PolicyName, ...] = Field(
+        ("closed-loop", "open-loop"), min_length=1, description="policies for that"
+    )
 
     @field_validator("curve")
     @classmethod

@@ -75,7 +75,7 @@ def work_of(stage: str, config: RunConfig, sources: int) -> float:
     Returns
     -------
     Objects [objects], clutters [scenes], grasps or samples [grasps, shards], samples times epochs
-    [train], clutters times policies [evaluate].
+    [train], clutters times policies, of the contest and of each scale of the curve [evaluate].
     """
     per_level = config.scenes.clutters_per_level
     clutters = {split: getattr(per_level, split) for split in config.scenes.splits}
@@ -89,7 +89,9 @@ def work_of(stage: str, config: RunConfig, sources: int) -> float:
         return float(config.grasps.count * config.train.epochs)
     if stage == "evaluate":
         picked = clutters.get(config.evaluate.split, 0)
-        return float(levels * picked * len(config.evaluate.policies))
+        robot = config.evaluate.imperfection
+        again = min(picked, robot.curve_clutters) * len(robot.curve_policies) * len(robot.curve)
+        return float(levels * (picked * len(config.evaluate.policies) + again))
     return float(config.grasps.count)
 
 
@@ -102,8 +104,8 @@ def work_done(stage: str, summary: dict[str, Any]) -> float:
         return samples
     if stage == "train":
         return samples * float(summary.get("epochs", 0))
-    by_policy = summary.get("policies", {})
-    return float(sum(found.get("clutters", 0) for found in by_policy.values()))
+    groups = [summary.get("policies", {}), *summary.get("imperfection", {}).values()]
+    return float(sum(found.get("clutters", 0) for group in groups for found in group.values()))
 
 
 def _counts(value: object) -> list[float]:

@@ -61,7 +61,7 @@ def panels_of(topics: Sequence[str]) -> Iterator[Panel]:
     for topic, (across, *lines) in CURVES.items():
         if topic in topics:
             yield PLOT, plot_panel(topic, across, lines)
-    for topic in ("/levels", "/policies", "/comparisons"):
+    for topic in ("/levels", "/policies", "/comparisons", "/imperfection"):
         if topic in topics:
             yield TABLE, {"topicPath": topic}
     for topic in ("/objects", "/scenes", "/grasps", "/samples", "/attempts", "/result", "/index"):
@@ -77,7 +77,7 @@ CURVES = {
     "/networks": ("multiply_adds", "val_mae", "test_mae"),
 }
 SHOWN = {
-    *("/tf", "/levels", "/policies", "/comparisons", *CURVES),
+    *("/tf", "/levels", "/policies", "/comparisons", "/imperfection", *CURVES),
     *("/objects", "/scenes", "/grasps", "/samples", "/attempts", "/result", "/index"),
 }
 

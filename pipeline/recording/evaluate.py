@@ -27,7 +27,7 @@ from pipeline.recording.recording import (
     start_path,
     time_panel,
 )
-from pipeline.recording.results import results_markdown
+from pipeline.recording.results import curve_markdown, results_markdown
 from pipeline.recording.robot import (
     GRIPPER,
     ShownRobot,
@@ -62,9 +62,10 @@ def draw_evaluate(stage: FinishedStage, figures: Mapping[str, Any]) -> None:
         levels = [message for _, message in artifact.messages(LevelResult, "/levels")]
         policies = [message for _, message in artifact.messages(LevelResult, "/policies")]
         comparisons = [message for _, message in artifact.messages(Comparison)]
+        curve = [message for _, message in artifact.messages(LevelResult, "/imperfection")]
     ordered = worst_first(attempts)
     shown = [ordered[i] for i in choose_evenly(len(ordered), stage.config.recording.attempts)]
-    text = results_markdown(levels, policies, comparisons)
+    text = results_markdown(levels, policies, comparisons) + curve_markdown(curve)
     scale = stage.config.gripper.pad.radius_m / PadConfig().radius_m
     view = blueprint(stage.config.evaluate.robot == "iiwa14", scale)
     with recording(stage, view) as stream:

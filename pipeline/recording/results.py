@@ -43,6 +43,22 @@ def results_markdown(
     return "\n".join(parts)
 
 
+def curve_markdown(curve: Sequence[LevelResult]) -> str:
+    """Success by the size of the robot's errors, a row a policy; empty where it was not asked."""
+    if not curve:
+        return ""
+    scales = sorted({point.imperfection_scale for point in curve})
+    rows = []
+    for policy in dict.fromkeys(point.policy for point in curve):
+        own = {point.imperfection_scale: point for point in curve if point.policy == policy}
+        rows.append(f"| {policy} | " + " | ".join(_rate(own[scale]) for scale in scales) + " |")
+    heads = " | ".join(f"{scale:g} times" for scale in scales)
+    return (
+        f"\n### By the robot's errors, at {curve[0].clutters} clutters\n\n"
+        f"| policy | {heads} |\n|-|{'-|' * len(scales)}\n" + "\n".join(rows) + "\n"
+    )
+
+
 def _policy_table(policy: str, levels: Sequence[LevelResult]) -> str:
     rows = "\n".join(
         f"| {r.level} | {r.lifted} / {r.attempts} | {_rate(r)} | {r.cleared} / {r.clutters} "

@@ -44,6 +44,16 @@ def figures_of(
         svg["fig-1"] = plots.fig_1(members, sweep["budget"]["mean_predictor_mae"])
     if success:
         svg["success"] = plots.success_by_level(rates(success))
+    if curve := (summaries["evaluate"] or {}).get("imperfection"):
+        svg["errors"] = plots.success_by_errors(
+            {
+                policy: {
+                    float(scale): plots.Rate(one["rate"], *one["interval_95"])
+                    for scale, one in by_scale.items()
+                }
+                for policy, by_scale in curve.items()
+            }
+        )
     if referee:
         svg["load"] = plots.load_by_quality(referee["by_tenth"])
     svg["timings"] = plots.wall_times(

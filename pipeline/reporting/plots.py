@@ -189,6 +189,32 @@ def success_by_level(rates: Mapping[str, Mapping[int, Rate]]) -> str:
         return _svg(figure)
 
 
+def success_by_errors(rates: Mapping[str, Mapping[float, Rate]]) -> str:
+    """Success of each policy over the factor on the robot's errors, with its 95 % interval."""
+    with mpl.rc_context(STYLE):
+        figure, (axes,) = _axes(1, 2.6, width=4.2)
+        for number, (policy, by_scale) in enumerate(rates.items()):
+            y = np.array([rate.rate for rate in by_scale.values()])
+            low = np.array([rate.low for rate in by_scale.values()])
+            high = np.array([rate.high for rate in by_scale.values()])
+            axes.errorbar(
+                list(by_scale),
+                100 * y,
+                yerr=100 * np.maximum([y - low, high - y], 0),
+                marker=MARKERS[number % len(MARKERS)],
+                color=_rgb(PALETTE[(4, 5, 2, 6, 0, 1)[number % 6]]),
+                capsize=2,
+                ms=5,
+                label=policy,
+            )
+        scales = sorted({scale for by_scale in rates.values() for scale in by_scale})
+        axes.set_xticks(scales)
+        axes.set(xlabel="errors of the robot, times as published [1]")
+        axes.set(ylabel="lifted [% of attempts]", ylim=(0, 103))
+        axes.legend(loc="lower left")
+        return _svg(figure)
+
+
 def load_by_quality(by_tenth: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
     """What grasps of each tenth of a score bear: median, and quartiles as bars, a panel a score."""
     with mpl.rc_context(STYLE):

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from pipeline.config import RunConfig
 from pipeline.config.imperfection import ImperfectionConfig
 from pipeline.geometry.compiled_poses import turned
 from pipeline.read_only import read_only
@@ -65,6 +66,13 @@ def draw_calibration(
         for _ in range(cameras_beside)
     ]
     return Calibration(wrench_bias, hand_eye, np.array(beside).reshape(-1, 4, 4))
+
+
+def with_imperfection(config: RunConfig, scale: float) -> RunConfig:
+    """The run's configuration with another factor over the robot's errors."""
+    imperfection = config.evaluate.imperfection.model_copy(update={"scale": scale})
+    evaluate = config.evaluate.model_copy(update={"imperfection": imperfection})
+    return config.model_copy(update={"evaluate": evaluate})
 
 
 class WrenchSensor:

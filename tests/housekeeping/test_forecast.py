@@ -44,7 +44,8 @@ def test_work_follows_the_configuration(config: RunConfig) -> None:
     assert work_of("scenes", config, 20) == 2 * (3 + 1 + 2)
     assert work_of("grasps", config, 20) == work_of("shards", config, 20) == 5000
     assert work_of("train", config, 20) == 20_000
-    assert work_of("evaluate", config, 20) == 2 * 2 * 2
+    curve = 2 * 1 * 2 * 3  # two policies at one clutter a level, at three scales
+    assert work_of("evaluate", config, 20) == 2 * 2 * 2 + curve
 
 
 def test_work_done_is_in_the_same_units() -> None:
@@ -52,6 +53,8 @@ def test_work_done_is_in_the_same_units() -> None:
     assert work_done("shards", {"samples": {"train": 40, "val": {"a": 5, "b": 5}}}) == 50
     assert work_done("train", {"samples": {"train": 40, "val": 10}, "epochs": 3}) == 150
     assert work_done("evaluate", {"policies": {"a": {"clutters": 4}, "b": {"clutters": 4}}}) == 8
+    at_scales = {"a": {"0": {"clutters": 2}, "2": {"clutters": 2}}}
+    assert work_done("evaluate", {"policies": {}, "imperfection": at_scales}) == 4
     assert work_done("evaluate", {}) == 0
 
 

@@ -18,7 +18,7 @@ TOPICS = {
     ),
     "grasps": ("/index",),
     "train": ("/epochs", "/result"),
-    "evaluate": ("/attempts", "/levels", "/policies", "/comparisons"),
+    "evaluate": ("/attempts", "/levels", "/policies", "/comparisons", "/imperfection"),
     "sweep": ("/budget", "/networks"),
     "of somebody": ("/slenderness",),
 }

@@ -37,6 +37,8 @@ batch_size = 32
 [evaluate]
 attempts_per_clutter = 2
 policies = ["closed-loop", "open-loop", "geometric"]
+[evaluate.imperfection]
+curve = [0.0, 1.0]
 [evaluate.policy]
 candidates = 24
 """

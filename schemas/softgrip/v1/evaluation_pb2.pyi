@@ -122,7 +122,7 @@ class DepthPicture(_message.Message):
     def __init__(self, camera: _Optional[str] = ..., depth_mm: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., intrinsics: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., world_from_camera: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., step: _Optional[int] = ..., left_px: _Optional[int] = ..., top_px: _Optional[int] = ..., whole_width_px: _Optional[int] = ..., whole_height_px: _Optional[int] = ...) -> None: ...
 
 class LevelResult(_message.Message):
-    __slots__ = ("level", "attempts", "lifted", "objects", "clutters", "cleared", "success_rate", "interval_low", "interval_high", "failures", "policy", "seconds_a_pick", "picks_an_hour", "seals", "lifted_at_first_seal", "carried")
+    __slots__ = ("level", "attempts", "lifted", "objects", "clutters", "cleared", "success_rate", "interval_low", "interval_high", "failures", "policy", "seconds_a_pick", "picks_an_hour", "seals", "lifted_at_first_seal", "carried", "imperfection_scale")
     class FailuresEntry(_message.Message):
         __slots__ = ("key", "value")
         KEY_FIELD_NUMBER: _ClassVar[int]
@@ -153,6 +153,7 @@ class LevelResult(_message.Message):
     SEALS_FIELD_NUMBER: _ClassVar[int]
     LIFTED_AT_FIRST_SEAL_FIELD_NUMBER: _ClassVar[int]
     CARRIED_FIELD_NUMBER: _ClassVar[int]
+    IMPERFECTION_SCALE_FIELD_NUMBER: _ClassVar[int]
     level: int
     attempts: int
     lifted: int
@@ -169,7 +170,8 @@ class LevelResult(_message.Message):
     seals: int
     lifted_at_first_seal: int
     carried: _containers.ScalarMap[str, int]
-    def __init__(self, level: _Optional[int] = ..., attempts: _Optional[int] = ..., lifted: _Optional[int] = ..., objects: _Optional[int] = ..., clutters: _Optional[int] = ..., cleared: _Optional[int] = ..., success_rate: _Optional[float] = ..., interval_low: _Optional[float] = ..., interval_high: _Optional[float] = ..., failures: _Optional[_Mapping[str, int]] = ..., policy: _Optional[str] = ..., seconds_a_pick: _Optional[float] = ..., picks_an_hour: _Optional[float] = ..., seals: _Optional[int] = ..., lifted_at_first_seal: _Optional[int] = ..., carried: _Optional[_Mapping[str, int]] = ...) -> None: ...
+    imperfection_scale: float
+    def __init__(self, level: _Optional[int] = ..., attempts: _Optional[int] = ..., lifted: _Optional[int] = ..., objects: _Optional[int] = ..., clutters: _Optional[int] = ..., cleared: _Optional[int] = ..., success_rate: _Optional[float] = ..., interval_low: _Optional[float] = ..., interval_high: _Optional[float] = ..., failures: _Optional[_Mapping[str, int]] = ..., policy: _Optional[str] = ..., seconds_a_pick: _Optional[float] = ..., picks_an_hour: _Optional[float] = ..., seals: _Optional[int] = ..., lifted_at_first_seal: _Optional[int] = ..., carried: _Optional[_Mapping[str, int]] = ..., imperfection_scale: _Optional[float] = ...) -> None: ...
 
 class Comparison(_message.Message):
     __slots__ = ("policy", "baseline", "clutters", "success_rate", "baseline_success_rate", "p_paired", "p_fisher")
