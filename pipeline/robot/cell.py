@@ -154,7 +154,7 @@ class DrivenRobot:
         self._driver.vacuum(on=False)
         self._goal = self.pose()
         self._go(self._calibration.home)
-        self._tare()
+        self.tare()
         self.reached_pose = np.eye(4)
         self.seal_pressure = math.nan
         self._began_s = self._driver.time_s()
@@ -170,6 +170,9 @@ class DrivenRobot:
     def enter(self, state: State) -> None:
         """Store the policy's phase for the record."""
         self._state = state
+
+    def think(self) -> None:
+        """Nothing is done: the time that ranking takes has passed by itself."""
 
     def pose(self) -> Float[np.ndarray, "4 4"]:
         """Measured world_from_gripper."""
@@ -292,8 +295,14 @@ class DrivenRobot:
         self._goal = turned(self._goal, share * turn)
         self._goal[:3, 3] += share * way
 
-    def _tare(self) -> None:
-        """Take the mean of what the empty, resting hand reads as the bias."""
+    def tare(self) -> None:
+        """Take the mean of what the empty, resting hand reads as the bias.
+
+        Raises
+        ------
+        CalibrationError
+            The wrench's noise is as large as what is to tell a held object or a touch.
+        """
         readings = []
         for _ in range(TARE_READINGS):
             self._driver.move(self._flange_at(self._goal))
