@@ -165,6 +165,18 @@ CHANNELS = (
         "counts; shares in [0, 1]; s a pick; scale dimensionless",
     ),
     Channel(
+        "/contacts",
+        ("softgrip.v1.ProposedContacts",),
+        "Contacts that a policy would propose in one clutter, what rates them, what they are worth",
+        "m, rad; distances to edges and clouds in r_G, GCS; q and ratings in [0, 1]; world frame",
+    ),
+    Channel(
+        "/precision",
+        ("softgrip.v1.RankedPrecision",),
+        "Average precision of one ranking of contacts over the clutters of one split",
+        "shares in [0, 1]; counts",
+    ),
+    Channel(
         "/networks",
         ("softgrip.v1.SweepNetwork",),
         "One network of the family that a study compares",

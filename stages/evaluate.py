@@ -3,9 +3,13 @@
 import os
 import shutil
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import TypeVar
+
+from google.protobuf.message import Message
 
 from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact
 from pipeline.artifacts.sharding import is_current
@@ -24,28 +28,32 @@ from pipeline.execution import (
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.messages.evaluation import attempt_message
 from pipeline.messages.evaluation_curve import curve_figures, curve_of, curve_scenes
-from pipeline.messages.evaluation_results import Results, results_of
+from pipeline.messages.evaluation_results import results_of
 from pipeline.messages.objects import read_objects
-from pipeline.messages.scenes import read_scenes
-from pipeline.messages.training import EXPORT
-from pipeline.network.control_inference import ControlPredictor
+from pipeline.messages.proposed_contacts import contacts_message, proposed_of
+from pipeline.messages.scenes import read_groups, read_scene, read_scenes
+from pipeline.messages.trained import rates_for
 from pipeline.recording.evaluate import draw_evaluate
-from pipeline.recording.results import curve_markdown, results_markdown
+from pipeline.recording.results import read_tables
 from pipeline.simulation.imperfection import with_imperfection
 from pipeline.simulation.picking import run_clutter
+from pipeline.simulation.proposed_contacts import propose_contacts
+from pipeline.spread import choose_evenly
 from pipeline.world.scene import ClutterScene
-from schemas.softgrip.v1.evaluation_pb2 import Attempt, Comparison, LevelResult
+from schemas.softgrip.v1.evaluation_pb2 import Attempt, ProposedContacts
 from stages.graph import EVALUATE, GIVEN_NETWORK, RUNS_DIR, inputs_of
 
-SCORE_THREADS = 1  # clutters run side by side, a worker a core
+SEEN = "train"  # the split whose families the network has seen
+RATED_BY: tuple[PolicyName, ...] = ("closed-loop", "analytic")  # by network and baseline
+M = TypeVar("M", bound=Message)
 
 
 @dataclass(frozen=True)
 class ClutterJob:
-    """One work item: all attempts of one policy at one clutter."""
+    """One work item: all attempts of one policy at one clutter; of none, its contacts rated."""
 
     scene: ClutterScene
-    policy: PolicyName
+    policy: PolicyName | None
     path: Path
     objects: Path
     network: Path
@@ -64,19 +72,25 @@ def build(stage: StageContext) -> Summary:
     curve = {scale: clutter_jobs(stage, some, robot.curve_policies, scale) for scale in robot.curve}
     # A policy, a clutter and a scale that both ask for are one job.
     jobs = {job.path: job for part in (contest, *curve.values()) for job in part}
-    done = run_in_order(pick_clutter, list(jobs.values()), stage.workers, stage.executor)
-    list(progress(done, len(jobs), "evaluate: clutters", "clutter"))
-    attempts = attempts_of(contest)
+    rated = clutter_jobs(stage, rated_scenes(stage), (None,), robot.scale)
+    done = run_in_order(work, [*jobs.values(), *rated], stage.workers, stage.executor)
+    list(progress(done, len(jobs) + len(rated), "evaluate: clutters", "clutter"))
+    attempts = made_in(contest, Attempt)
     results = results_of(scenes, wanted.policies, attempts, accelerations)
-    points = curve_of(
-        some,
-        robot.curve_policies,
-        {scale: attempts_of(part) for scale, part in curve.items()},
-        accelerations,
-    )
-    publish(stage, attempts, results, points)
+    tried = {scale: made_in(part, Attempt) for scale, part in curve.items()}
+    points = curve_of(some, robot.curve_policies, tried, accelerations)
+    items = catalogue(stage.upstream("objects"))
+    classes = {name: str(item.shape_class) for name, (item, _) in items.items()}
+    contacts = made_in(rated, ProposedContacts)
+    proposed = proposed_of(contacts, classes, wanted.precision, wanted.split)
+    topics: dict[str, Sequence[Message]] = {"/attempts": attempts, "/imperfection": points}
+    topics |= results.topics() | proposed.topics()
+    with ArtifactWriter(stage.output, stage.provenance()) as artifact:
+        for topic, messages in topics.items():
+            for number, message in enumerate(messages):
+                artifact.write(topic, message, log_time_ns=number)
     shutil.rmtree(stage.folder.state("evaluate"))
-    return {**results.summary(), "imperfection": curve_figures(points)}
+    return {**results.summary(), "imperfection": curve_figures(points), **proposed.summary()}
 
 
 def clutters(stage: StageContext) -> list[ClutterScene]:
@@ -94,7 +108,7 @@ def clutters(stage: StageContext) -> list[ClutterScene]:
 def clutter_jobs(
     stage: StageContext,
     scenes: list[ClutterScene],
-    policies: tuple[PolicyName, ...],
+    policies: Sequence[PolicyName | None],
     scale: float,
 ) -> list[ClutterJob]:
     """Every policy at every clutter, on a robot whose errors have this scale."""
@@ -102,7 +116,8 @@ def clutter_jobs(
         ClutterJob(
             scene=scene,
             policy=policy,
-            path=stage.folder.state("evaluate") / f"{scene.scene_id}.{policy}.{scale:g}.mcap",
+            path=stage.folder.state("evaluate")
+            / f"{scene.scene_id}.{policy or 'contacts'}.{scale:g}.mcap",
             objects=stage.upstream("objects"),
             network=stage.inputs.get(GIVEN_NETWORK) or stage.upstream("train"),
             config=stage.config,
@@ -114,30 +129,51 @@ def clutter_jobs(
     ]
 
 
-def pick_clutter(job: ClutterJob) -> Path:
-    """Make, or keep, the attempts at one clutter."""
-    if is_current(job.path, job.provenance.key):
-        return job.path
-    objects = {name: item for name, (item, _) in catalogue(job.objects).items()}
-    score = network(job.network).predict
-    rng = generator(job.config.seed, "evaluate", job.scene.scene_id)
-    config = with_imperfection(job.config, job.scale)
-    made = run_clutter(job.scene, objects, job.policy, score, config, rng)
-    scene = job.scene
-    with ArtifactWriter(job.path, job.provenance) as artifact:
-        for number, attempt in enumerate(made):
-            message = attempt_message(
-                scene.scene_id,
-                scene.level,
-                len(scene.objects),
-                number,
-                job.policy,
-                job.config.evaluate.judge,
-                attempt,
-                job.config,
-            )
-            artifact.write("/attempts", message, log_time_ns=number)
+def rated_scenes(stage: StageContext) -> list[ClutterScene]:
+    """Some clutters a level of the evaluated and of the seen families, equally far apart."""
+    wanted, path = stage.config.evaluate, stage.upstream("scenes")
+    by_group: dict[tuple[str, int], list[int]] = {}
+    for index, group in enumerate(read_groups(path)):
+        by_group.setdefault(group, []).append(index)
+    return [
+        read_scene(path, numbers[index])
+        for (split, _), numbers in by_group.items()
+        if split in (wanted.split, SEEN)
+        for index in choose_evenly(len(numbers), wanted.precision.clutters_per_level)
+    ]
+
+
+def work(job: ClutterJob) -> Path:
+    """Make, or keep, what comes of one clutter."""
+    if not is_current(job.path, job.provenance.key):
+        messages = attempts_at(job, job.policy) if job.policy else contacts_at(job)
+        with ArtifactWriter(job.path, job.provenance) as artifact:
+            for number, message in enumerate(messages):
+                artifact.write("/attempts" if job.policy else "/contacts", message, number)
     return job.path
+
+
+def attempts_at(job: ClutterJob, policy: PolicyName) -> list[Attempt]:
+    """A policy's attempts at a clutter."""
+    objects = {name: item for name, (item, _) in catalogue(job.objects).items()}
+    scene, config = job.scene, with_imperfection(job.config, job.scale)
+    score = rates_for(policy, job.network, config.gripper)
+    rng = generator(config.seed, "evaluate", scene.scene_id)
+    made = run_clutter(scene, objects, policy, score, config, rng)
+    about, judge = (scene.scene_id, scene.level, len(scene.objects)), config.evaluate.judge
+    return [
+        attempt_message(*about, number, policy, judge, attempt, job.config)
+        for number, attempt in enumerate(made)
+    ]
+
+
+def contacts_at(job: ClutterJob) -> list[ProposedContacts]:
+    """Contacts in a clutter's pictures, rated and labelled: one message."""
+    meshes = {name: item.mesh for name, (item, _) in catalogue(job.objects).items()}
+    network, analytic = (rates_for(policy, job.network, job.config.gripper) for policy in RATED_BY)
+    rng = generator(job.config.seed, "evaluate contacts", job.scene.scene_id)
+    found = propose_contacts(job.scene, meshes, network, analytic, job.config, rng)
+    return [contacts_message(job.scene, found)]
 
 
 @lru_cache(maxsize=1)
@@ -146,53 +182,18 @@ def catalogue(objects: Path) -> dict[str, tuple[CatalogueObject, str]]:
     return read_objects(objects)
 
 
-@lru_cache(maxsize=1)
-def network(path: Path) -> ControlPredictor:
-    """The network as exported for control, of a train artifact or given; read once a worker."""
-    if path.name == GIVEN_NETWORK:
-        return ControlPredictor(path.read_bytes(), SCORE_THREADS)
-    with open_artifact(path) as artifact:
-        return ControlPredictor(artifact.attachment(EXPORT), SCORE_THREADS)
-
-
-def attempts_of(jobs: list[ClutterJob]) -> list[Attempt]:
-    """All attempts of jobs that are done, in their order."""
-    found: list[Attempt] = []
+def made_in(jobs: Sequence[ClutterJob], kind: type[M]) -> list[M]:
+    """All messages of a kind in jobs that are done, in their order."""
+    found: list[M] = []
     for job in jobs:
         with open_artifact(job.path) as artifact:
-            found += [message for _, message in artifact.messages(Attempt)]
+            found += [message for _, message in artifact.messages(kind)]
     return found
-
-
-def publish(
-    stage: StageContext, attempts: list[Attempt], results: Results, curve: list[LevelResult]
-) -> None:
-    """Write the artifact."""
-    with ArtifactWriter(stage.output, stage.provenance()) as artifact:
-        for number, message in enumerate(attempts):
-            artifact.write("/attempts", message, log_time_ns=number)
-        for number, result in enumerate(results.levels):
-            artifact.write("/levels", result, log_time_ns=number)
-        for number, result in enumerate(results.policies):
-            artifact.write("/policies", result, log_time_ns=number)
-        for number, comparison in enumerate(results.comparisons):
-            artifact.write("/comparisons", comparison, log_time_ns=number)
-        for number, result in enumerate(curve):
-            artifact.write("/imperfection", result, log_time_ns=number)
-
-
-def print_table(folder: RunFolder) -> None:
-    """The table of a finished evaluation."""
-    with open_artifact(folder.artifact("evaluate")) as artifact:
-        levels = [message for _, message in artifact.messages(LevelResult, "/levels")]
-        policies = [message for _, message in artifact.messages(LevelResult, "/policies")]
-        comparisons = [message for _, message in artifact.messages(Comparison)]
-        curve = [message for _, message in artifact.messages(LevelResult, "/imperfection")]
-    sys.stdout.write(results_markdown(levels, policies, comparisons) + curve_markdown(curve))
 
 
 if __name__ == "__main__":
     if sys.argv[1:] == ["--table"]:
-        print_table(RunFolder(RUNS_DIR / os.environ.get("RUN", "default")))
+        finished = RunFolder(RUNS_DIR / os.environ.get("RUN", "default"))
+        sys.stdout.write(read_tables(finished.artifact("evaluate")))
     else:
         stage_command(EVALUATE, build, inputs_of, draw=draw_evaluate)

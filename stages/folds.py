@@ -3,9 +3,11 @@
 In ``runs/<run>/folds``: the objects of the run, dealt to folds by family; ``fold-<k>`` with the
 clutters and grasps of one fold's objects alone; a network for each fold, trained on the others, its
 best epoch chosen on the next one; folds.summary.json and .md. Embedded objects beside meshes are
-dealt too and never tested on.
+dealt too and never tested on. A fold that was tested is kept in ``fold-<k>/tested.json`` until its
+grasps, configuration or code change: what was stopped goes on at the next fold.
 """
 
+import hashlib
 import json
 import sys
 import time
@@ -22,16 +24,18 @@ from pipeline.config import RunConfig, load_run_config
 from pipeline.config.judged import folds_config
 from pipeline.config.written import as_toml
 from pipeline.execution import RunFolder, generator, run_command
+from pipeline.execution.code import code_digests
 from pipeline.geometry.folds import deal_families
 from pipeline.geometry.parametric import PARAMETRIC_OBJECTS
 from pipeline.messages.objects import TOPIC, object_message, read_objects
-from pipeline.network.folds import figures_of_folds, train_and_test
+from pipeline.network.folds import TestedFold, figures_of_folds, train_and_test
 from pipeline.reporting.folds import as_markdown
 from stages.graph import RUNS_DIR
 from stages.holdout import labelled
 from stages.train import print_epoch
 
 NAME = "folds"
+TESTED, TRAINED_BY = "tested.json", "pipeline.network.folds"
 FOLDS = 5  # a fifth of the families is tested on at a time; what make passes in FOLDS wins
 FEWEST_FOLDS = 3  # one to test on, one to choose the epoch on, one to train on
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
@@ -91,8 +95,13 @@ def measure(run: RunName = "default", folds: Folds = FOLDS, runs_dir: RunsDir = 
     done = []
     for fold in range(folds):
         logger.info("folds: fold {} of {}", fold, folds)
-        state = fold_folder(folder, fold).state("train")
-        done.append(train_and_test(config, parts, fold, tested(objects), state, print_epoch))
+        own, key = fold_folder(folder, fold), key_of(folder, fold, folds)
+        if (kept := read_kept(own, key)) is None:
+            state = own.state("train")
+            kept = train_and_test(config, parts, fold, tested(objects), state, print_epoch)
+            text = json.dumps({"key": key, "tested": kept.to_json()})
+            publish_bytes(own.path / TESTED, text.encode())
+        done.append(kept)
     rng = generator(config.seed, NAME)
     figures = figures_of_folds(done, families, config.folds.resamples, rng) | {
         "layers": config.network.layers,
@@ -102,6 +111,22 @@ def measure(run: RunName = "default", folds: Folds = FOLDS, runs_dir: RunsDir = 
     publish_bytes(folder.summary(NAME), summary.encode())
     publish_bytes(folder.path / f"{NAME}.md", text.encode())
     sys.stdout.write(text)
+
+
+def key_of(folder: RunFolder, fold: int, folds: int) -> str:
+    """What the test of a fold depends on: the grasps of all folds, configuration and code."""
+    made = [read_provenance(fold_folder(folder, k).artifact("grasps")).key for k in range(folds)]
+    text = json.dumps([fold, made, folder.config.read_text(), code_digests(TRAINED_BY)])
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def read_kept(folder: RunFolder, key: str) -> TestedFold | None:
+    """The test of a fold as it was kept; None where there is none with this key."""
+    path = folder.path / TESTED
+    if not path.is_file():
+        return None
+    found = json.loads(path.read_text())
+    return TestedFold.from_json(found["tested"]) if found["key"] == key else None
 
 
 if __name__ == "__main__":

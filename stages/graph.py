@@ -36,14 +36,17 @@ SHARDS = Stage(
 )
 TRAIN = Stage(
     "train",
-    ("seed", "network", "train", "gripper.pad"),
+    ("seed", "network", "train", "gripper"),
     ("shards",),
     shown=("recording.clouds",),
     drawn_apart=True,
 )
 EVALUATE = Stage(
     "evaluate",
-    ("seed", "evaluate", "referee", "scenes", "cameras", "gripper", "sensing"),
+    (
+        *("seed", "evaluate", "referee", "scenes", "cameras", "gripper", "sensing"),
+        *("grasps.normal_radius_rg", "grasps.clearance_rg"),
+    ),
     ("objects", "scenes", "train"),
     shown=("recording.attempts",),
     drawn_apart=True,

@@ -29,9 +29,10 @@ from pipeline.messages.training import EXPORT
 from pipeline.network.by_object import ObjectError, check_labels, errors_by_object, macro_error
 from pipeline.network.control_inference import ControlPredictor
 from pipeline.network.figures import mean_absolute_error, weighted_error
+from pipeline.network.fitted_baselines import errors_without_training
 from pipeline.network.given import given_network
 from pipeline.network.samples import Samples
-from pipeline.network.sources import ANALYTIC, RELEASED, quality_source
+from pipeline.network.sources import RELEASED, released_baseline
 from pipeline.recording.holdout import blueprint, show_holdout
 from pipeline.recording.recording import recording
 from pipeline.reporting.agreement import as_csv
@@ -146,13 +147,11 @@ def labelled(folder: RunFolder) -> tuple[tuple[str, ...], Samples]:
 
 
 def baselines(samples: Samples, config: RunConfig) -> dict[str, float]:
-    """Errors of the released baseline on some of the grasps, equally far apart."""
+    """Errors of baselines on some of the grasps, equally far apart."""
     some = np.array(choose_evenly(len(samples), config.holdout.baseline_grasps), dtype=np.int64)
     if not len(some):
         return {}
-    source = quality_source(ANALYTIC, config.gripper, config.train.threads)
-    found = source.predict(samples.cloud[some], samples.cloud_mask[some])
-    return {"label on the measured cloud": mean_absolute_error(found, samples.quality[some])}
+    return errors_without_training(samples.take(some), released_baseline(config.gripper))
 
 
 def told_by_stages(folder: RunFolder, errors: list[ObjectError]) -> dict[str, Any]:

@@ -22,6 +22,7 @@ from pipeline.config.written import as_toml
 from pipeline.execution import RunFolder, generator, progress, run_command, run_in_order
 from pipeline.messages.grasp_columns import GraspColumns, read_columns
 from pipeline.messages.scenes import read_placed
+from pipeline.messages.trained import SCORE_THREADS, control_predictor
 from pipeline.network.analytic import fit_analytic
 from pipeline.network.sources import RELEASED, quality_source
 from pipeline.recording.recording import recording
@@ -33,7 +34,7 @@ from pipeline.reporting.agreement import as_csv, as_markdown
 from pipeline.reporting.plots import load_by_quality
 from pipeline.stopwatch import Stopwatch
 from pipeline.world.scene import PlacedObject
-from stages.evaluate import SCORE_THREADS, catalogue, network
+from stages.evaluate import catalogue
 from stages.graph import RUNS_DIR
 
 NAME = "referee"
@@ -89,8 +90,7 @@ def judge(run: RunName = "default", workers: Workers = CORES, runs_dir: RunsDir 
     chosen = judging.chosen_evenly(grasps.quality, objects, wanted.grasps, rng)  # scene by scene
     again = judging.chosen_evenly(grasps.quality[chosen], objects[chosen], wanted.varied, rng)
     among = np.isin(np.arange(len(chosen)), again)
-    weights = judging.stands_for(grasps.quality, chosen)
-    poses = grasps.world_from_gripper
+    weights, poses = judging.stands_for(grasps.quality, chosen), grasps.world_from_gripper
     jobs = [
         SceneJob(int(scene), poses[rows], grasps.body_id[rows], some, folder, config)
         for scene in np.unique(grasps.scene[chosen])
@@ -129,7 +129,7 @@ def predicted(run: RunFolder, grasps: GraspColumns, rows: np.ndarray, config: Ru
     if not run.artifact("train").is_file():
         released = quality_source(RELEASED, config.gripper, SCORE_THREADS)
         return {"q-hat, released network": released.predict(cloud, mask)}
-    score = network(run.artifact("train")).predict(cloud, mask)
+    score = control_predictor(run.artifact("train")).predict(cloud, mask)
     objects = catalogue(run.artifact("objects"))
     unseen = np.array([objects.get(n, (0, ""))[1] != "train" for n in grasps.object_name[rows]])
     return {"q-hat": score, "q-hat, unseen objects": np.where(unseen, score, np.nan)}

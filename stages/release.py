@@ -17,10 +17,10 @@ from pipeline.config import load_run_config
 from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder, generator, run_command
 from pipeline.messages.training import CHECKPOINT, EXPORT
-from pipeline.network.analytic import fit_analytic
 from pipeline.network.by_object import errors_by_object, macro_error
 from pipeline.network.control_inference import ControlPredictor
 from pipeline.network.figures import mean_absolute_error, weighted_error
+from pipeline.network.fitted_baselines import baseline_errors, fit_baselines
 from pipeline.network.sources import (
     BASELINE_FILE,
     DIGESTS_FILE,
@@ -32,7 +32,7 @@ from stages.graph import RUNS_DIR
 from stages.shards import gather
 
 FIGURES_FILE = "figures.json"
-FITTED = 4000  # training samples that the baseline is fitted to, as for the first release
+FITTED = 4000  # training samples that the baselines are fitted to, as for the first release
 
 
 def release(
@@ -51,7 +51,7 @@ def release(
     train_set, test_set = by_split["train"], by_split["test"]
     order = generator(config.seed, "release").permutation(len(train_set))[:FITTED]
     fit = train_set.take(np.sort(order))
-    baseline = fit_analytic(fit.cloud, fit.cloud_mask, fit.quality, config.gripper)
+    fitted = fit_baselines(fit, config.gripper, FITTED)
     predict = ControlPredictor((trained / EXPORT).read_bytes(), config.train.threads).predict
     cloud, mask, quality = test_set.cloud, test_set.cloud_mask, test_set.quality
     single, averaged = (predict(cloud, mask, average_symmetries=each) for each in (False, True))
@@ -66,14 +66,14 @@ def release(
         "mae_as_proposed": weighted_error(single, quality, weight),
         "mae_macro": macro_error(errors, graspable_alone=False),
         "mae_macro_graspable": macro_error(errors, graspable_alone=True),
-        "analytic_mae": mean_absolute_error(baseline.predict(cloud, mask), quality),
+        **baseline_errors(fitted, test_set).summary(),
         "best_constant_mae": float(np.abs(quality - np.median(quality)).mean()),
         "by_object": {one.name: one.figures() for one in errors},
     }
     files = {
         EXPORT: (trained / EXPORT).read_bytes(),
         CHECKPOINT: (trained / CHECKPOINT).read_bytes(),
-        BASELINE_FILE: baseline_to_json(baseline).encode(),
+        BASELINE_FILE: baseline_to_json(fitted.analytic).encode(),
         FIGURES_FILE: (json.dumps(figures, indent=1) + "\n").encode(),
     }
     for name, data in files.items():

@@ -12,10 +12,11 @@ from pipeline.artifacts import package_version, publish_bytes
 from pipeline.config import load_run_config
 from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder, run_command
+from pipeline.network.fitted_baselines import SUMMARY_NAMES, TITLES
 from pipeline.reporting.agreement import as_markdown
 from pipeline.reporting.facts import read_catalogue, read_origins, read_success, read_summary
 from pipeline.reporting.failures import failures_of
-from pipeline.reporting.figures import figures_of, overall_rates
+from pipeline.reporting.figures import figures_of, overall_rates, proposed_tables
 from pipeline.reporting.lineage import lineage_of, lineage_svg
 from pipeline.reporting.page import html_page, markdown_page
 from pipeline.reporting.words import describe_meshes, headline, mixed_parts
@@ -75,6 +76,7 @@ def make_report(folder: RunFolder) -> Path:
             "mixed": mixed_parts(folder, provenance, names),
             "missing": [(n, GOALS.get(n, n)) for n in names if summaries[n] is None],
             "catalogue": catalogue,
+            "baselines": {SUMMARY_NAMES[kind]: title for kind, title in TITLES.items()},
             "classes": dict(sorted(Counter(o.shape_class for o in catalogue.objects).items())),
             "splits": dict(Counter(o.split for o in catalogue.objects)),
             "levels": sorted(config.scenes.levels),
@@ -86,6 +88,7 @@ def make_report(folder: RunFolder) -> Path:
             "picture": lambda name: f"{FIGURES}/{name}",
             "not_yet": lambda what, goal: f"Not made yet: `make {goal} RUN={run}`.",
             "success": success,
+            **proposed_tables(summaries["evaluate"]),
             "referee": as_markdown(referee) if referee else "",
             "overall": overall_rates(summaries["evaluate"]),
             "comparisons": (summaries["evaluate"] or {}).get("comparisons", {}),

@@ -23,12 +23,12 @@ from pipeline.control.decision import Cause
 from pipeline.control.strategies import build_strategy
 from pipeline.control.success import success_rate
 from pipeline.execution import RunFolder, generator, progress, run_command, run_in_order
+from pipeline.messages.trained import rates_for
 from pipeline.network.given import given_network
 from pipeline.network.sources import RELEASED
 from pipeline.simulation.imperfection import with_imperfection
 from pipeline.simulation.picking import Clutter
 from pipeline.simulation.scenarios import SCENARIOS, make_trials, with_segmentation
-from stages.evaluate import network
 from stages.graph import GIVEN_NETWORK, RUNS_DIR
 
 FOLDER = "scenarios"  # where a network that is named is kept
@@ -108,7 +108,8 @@ def run_scenario(job: ScenarioJob) -> Row:
     """Make one attempt in each trial of a scenario."""
     scenario = SCENARIOS[job.index]
     config = with_segmentation(job.config, scenario)
-    strategy = build_strategy(job.policy, network(job.network).predict, config)
+    score = rates_for(job.policy, job.network, config.gripper)
+    strategy = build_strategy(job.policy, score, config)
     # The same scenes for every policy and condition, and for the same things seen otherwise.
     rng = generator(config.seed, "scenario", scenario.name.removesuffix(", segmented"))
     scenes = make_trials(scenario, job.trials, job.config.objects.density_kg_m3, rng)

@@ -5,6 +5,7 @@ On several GPUs, or several processes of one machine: ``make train RANKS=2``, wh
 the rest.
 """
 
+from collections.abc import Mapping
 from functools import partial, update_wrapper
 
 from loguru import logger
@@ -12,15 +13,23 @@ from loguru import logger
 from pipeline.artifacts import ArtifactWriter, publish_bytes
 from pipeline.execution import StageContext, Summary, stage_command
 from pipeline.messages.sample_cache import cached_split
-from pipeline.messages.training import CHECKPOINT, EXPORT, epoch_message, result_message
+from pipeline.messages.training import (
+    BASELINE,
+    CHECKPOINT,
+    EXPORT,
+    epoch_message,
+    result_message,
+)
 from pipeline.network.checkpoint import save_checkpoint_bytes
 from pipeline.network.control_inference import ControlPredictor, check_export
 from pipeline.network.export import export_onnx_bytes
+from pipeline.network.fitted_baselines import fit_baselines
 from pipeline.network.ga_cnn import parameter_count
 from pipeline.network.held_out import TestFigures, measure_held_out
 from pipeline.network.parallel import ALONE, Ranks, join_ranks
 from pipeline.network.resuming import EpochMetrics
 from pipeline.network.samples import Samples
+from pipeline.network.sources import baseline_to_json
 from pipeline.network.timing import runtimes_ms_a_grasp
 from pipeline.network.training import TrainedNetwork, choose_device, train
 from pipeline.recording.train import draw_train
@@ -50,13 +59,18 @@ def build(stage: StageContext, ranks: Ranks = ALONE) -> Summary:
     )
     if not ranks.first:
         return {}
-    pad = config.gripper.pad
-    figures = measure_held_out(trained.network, config.train, pad, train_set, val_set, test_set)
+    fitted = fit_baselines(train_set, config.gripper, config.train.baseline_samples)
+    figures = measure_held_out(trained.network, config.train, fitted, train_set, val_set, test_set)
     exported = export_for_control(stage, trained, test_set)
     checkpoint = save_checkpoint_bytes(trained.network)
-    publish_bytes(stage.folder.path / "train" / CHECKPOINT, checkpoint)
-    publish_bytes(stage.folder.path / "train" / EXPORT, exported)
-    write(stage, trained, figures, checkpoint, exported)
+    attached = {
+        CHECKPOINT: checkpoint,
+        EXPORT: exported,
+        BASELINE: baseline_to_json(fitted.analytic).encode(),
+    }
+    for name, data in attached.items():
+        publish_bytes(stage.folder.path / "train" / name, data)
+    write(stage, trained, figures, attached)
     inference = runtimes_ms_a_grasp(
         trained.network,
         ControlPredictor(exported, config.train.threads),
@@ -103,17 +117,16 @@ def write(
     stage: StageContext,
     trained: TrainedNetwork,
     figures: TestFigures,
-    checkpoint: bytes,
-    exported: bytes,
+    attached: Mapping[str, bytes],
 ) -> None:
-    """The artifact, which carries curve, figures and weights."""
+    """The artifact, which carries curve, figures, weights and the fitted baseline."""
     with ArtifactWriter(stage.output, stage.provenance()) as artifact:
         for epoch in trained.history:
             artifact.write("/epochs", epoch_message(epoch), log_time_ns=epoch.epoch)
         result = result_message(trained, figures)
         artifact.write("/result", result, log_time_ns=len(trained.history))
-        artifact.attach(CHECKPOINT, "application/octet-stream", checkpoint)
-        artifact.attach(EXPORT, "application/octet-stream", exported)
+        for name, data in attached.items():
+            artifact.attach(name, "application/octet-stream", data)
 
 
 def summary(

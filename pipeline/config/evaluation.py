@@ -123,6 +123,32 @@ class ArmConfig(Section):
     hand_mass_kg: float = Field(0.6, gt=0, description="of the gripper at the flange [kg]")
 
 
+class PrecisionConfig(Section):
+    """Average precision of ranked contacts, and what predictions of them err by; as SuctionNet."""
+
+    clutters_per_level: int = Field(
+        2, ge=0, description="clutters of each level, of seen and unseen families each; 0: none"
+    )
+    contacts: int = Field(
+        384, ge=1, le=4096, description="contacts drawn in a scene, as the policy draws them"
+    )
+    top: int = Field(50, ge=1, description="contacts judged in a scene; SuctionNet: 50")
+    most_an_object: int = Field(
+        10, ge=1, description="of these, at most so many on an object; SuctionNet: 10"
+    )
+    apart_m: float = Field(
+        0.02, ge=0, description="non-maximum suppression; SuctionNet: 2 cm, whatever the pad [m]"
+    )
+    thresholds: tuple[float, ...] = Field(
+        (0.2, 0.4, 0.6, 0.8),
+        min_length=1,
+        description="q from which a contact is good; SuctionNet: 0.2 to 0.8 of its own score [1]",
+    )
+    shown: int = Field(
+        6, ge=0, le=50, description="worst clouds kept of a scene, for recording and page; 14 kB"
+    )
+
+
 class EvaluateConfig(Section):
     """Closed-loop evaluation on the clutters of one split."""
 
@@ -139,7 +165,7 @@ class EvaluateConfig(Section):
         "test", description="whose clutters are picked; choices are made on val"
     )
     policies: tuple[PolicyName, ...] = Field(
-        ("closed-loop", "uncorrected", "one-seal", "open-loop", "geometric"),
+        ("closed-loop", "analytic", "uncorrected", "one-seal", "open-loop", "geometric"),
         min_length=1,
         description="the first is judged",
     )
@@ -163,6 +189,7 @@ class EvaluateConfig(Section):
     arm: ArmConfig = ArmConfig()
     policy: PolicyConfig = PolicyConfig()
     imperfection: ImperfectionConfig = ImperfectionConfig()
+    precision: PrecisionConfig = PrecisionConfig()
 
     @model_validator(mode="after")
     def _tug_is_part_of_the_lift(self) -> Self:

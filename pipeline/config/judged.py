@@ -39,7 +39,8 @@ def judged_config(config: RunConfig) -> RunConfig:
 def holdout_config(config: RunConfig) -> RunConfig:
     """A run's configuration with every object in the test split, as [holdout] wants it.
 
-    Settings for the run's own meshes are left out: families, copies, a limit, transparent names.
+    Settings for the run's own meshes are left out: families, masses, copies, a limit, transparent
+    names.
     """
     wanted = config.holdout
     return config.model_copy(
@@ -50,6 +51,7 @@ def holdout_config(config: RunConfig) -> RunConfig:
                     "embedded_in_training": False,
                     "stretched_copies": 0,
                     "transparent": (),
+                    "masses": "",
                 }
             ),
             "split": config.split.model_copy(update={"families": "", "all_in_test": True}),
@@ -75,14 +77,15 @@ def folds_config(config: RunConfig, folds: int) -> RunConfig:
 
     Labels are dealt over the folds. Stretched copies are left out.
     """
-    wanted, families = config.folds, config.split.families
+    wanted = config.folds
+    families, masses = (
+        f"../{name}" if name else "" for name in (config.split.families, config.objects.masses)
+    )  # beside the run's own run.toml
+    dealt = {"limit": 0, "stretched_copies": 0, "masses": masses}
     return config.model_copy(
         update={
-            "objects": config.objects.model_copy(update={"limit": 0, "stretched_copies": 0}),
-            # The file lies beside the run's own run.toml.
-            "split": config.split.model_copy(
-                update={"families": f"../{families}" if families else "", "all_in_test": True}
-            ),
+            "objects": config.objects.model_copy(update=dealt),
+            "split": config.split.model_copy(update={"families": families, "all_in_test": True}),
             "scenes": config.scenes.model_copy(
                 update={
                     "splits": ("test",),

@@ -73,6 +73,11 @@ class TrainConfig(Section):
     gradient_norm_max: float = Field(1.0, gt=0, le=1e6, description="longer gradients are cut")
     patience_epochs: int = Field(15, ge=1, description="stop after so many epochs without gain")
     augment: bool = Field(True, description="turn and mirror clouds about the approach axis")
+    baseline_samples: int = Field(
+        400,
+        ge=16,
+        description="training samples that the analytic baseline is fitted to, for the comparison",
+    )
     threads: int = Field(2, ge=1, le=256, description="CPU threads; part of the run's identity")
     device: Literal["auto", "cpu", "cuda"] = Field(
         "auto", description="'auto' takes a GPU where there is one"

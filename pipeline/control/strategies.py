@@ -10,7 +10,8 @@ def build_strategy(name: PolicyName, predict: Predict, config: RunConfig) -> Str
     """Build one of the policies that are compared.
 
     - closed-loop: takes several views, corrects its aim on the way, and reacts to the wrench.
-    - uncorrected: the same without corrections.
+    - analytic: the same with the analytic label on the measured cloud in place of the network.
+    - uncorrected: closed-loop without corrections.
     - one-seal: the same as closed-loop without a second seal.
     - open-loop: executes what the network rates best on the first picture.
     - geometric: executes the flattest place for the pad at the highest point, of as many views as
@@ -23,7 +24,8 @@ def build_strategy(name: PolicyName, predict: Predict, config: RunConfig) -> Str
     name
         Name of the policy.
     predict
-        Network that rates grasps; the geometric policy does not use it.
+        Rates grasps: the analytic baseline for policy analytic, for others the network; the
+        geometric policy does not use it.
     config
         The run.
 

@@ -4,6 +4,8 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from google.protobuf.message import Message
+
 from pipeline.config.evaluation import PolicyName
 from pipeline.control.success import Outcome, advantage, bootstrap_interval, success_rate
 from pipeline.world.scene import ClutterScene
@@ -27,6 +29,14 @@ class Results:
     levels: list[LevelResult]
     policies: list[LevelResult]
     comparisons: list[Comparison]
+
+    def topics(self) -> dict[str, Sequence[Message]]:
+        """The messages of evaluate's artifact by their topics."""
+        return {
+            "/levels": self.levels,
+            "/policies": self.policies,
+            "/comparisons": self.comparisons,
+        }
 
     def summary(self) -> dict[str, object]:
         """The stage's headline figures; `success_by_level` is the first policy's."""

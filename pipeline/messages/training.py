@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from pipeline.artifacts.tensors import from_tensor, to_tensor
+from pipeline.network.fitted_baselines import MEAN, BaselineErrors
 from pipeline.network.held_out import CLASSES, TestFigures, error_by_pictures
 from pipeline.network.resuming import EpochMetrics
 from pipeline.network.samples import Samples
@@ -15,6 +16,7 @@ from schemas.softgrip.v1.training_pb2 import Epoch, TrainingResult
 
 CHECKPOINT = "ga_cnn.safetensors"
 EXPORT = "ga_cnn.onnx"
+BASELINE = "analytic.json"  # the analytic label on the measured cloud, as it was fitted
 
 
 def epoch_message(metrics: EpochMetrics) -> Epoch:
@@ -31,15 +33,15 @@ def epoch_message(metrics: EpochMetrics) -> Epoch:
 
 def result_message(trained: TrainedNetwork, figures: TestFigures) -> TrainingResult:
     """The message of a finished training."""
-    config = trained.network.config
+    config, baselines = trained.network.config, figures.baselines
     return TrainingResult(
         layers=config.layers,
         channels=config.channels,
         parameters=sum(tensor.numel() for tensor in trained.network.parameters()),
         best_epoch=trained.best_epoch,
         test_mae=figures.mae,
-        mean_predictor_mae=figures.mean_predictor_mae,
-        baseline_mae={"mean": figures.mean_predictor_mae, "seal_ratio": figures.seal_ratio_mae},
+        mean_predictor_mae=baselines.balanced[MEAN],
+        baseline_mae=baselines.balanced,
         test_mae_by_class=figures.by_class,
         test_mae_by_pictures={name: error for name, (error, _) in figures.by_pictures.items()},
         test_mae_by_tenth=to_tensor(_numbers(figures.by_tenth)),
@@ -52,7 +54,8 @@ def result_message(trained: TrainedNetwork, figures: TestFigures) -> TrainingRes
         train_count=figures.train_count,
         val_count=figures.val_count,
         test_mae_as_proposed=figures.mae_as_proposed,
-        mean_predictor_mae_as_proposed=figures.mean_predictor_mae_as_proposed,
+        mean_predictor_mae_as_proposed=baselines.as_proposed.get(MEAN),
+        baseline_mae_as_proposed=baselines.as_proposed,
     )
 
 
@@ -90,9 +93,9 @@ def figures_of(message: TrainingResult, test_set: Samples) -> TestFigures:
         mae=message.test_mae,
         mae_single=message.test_mae_single,
         mae_as_proposed=_optional(message, "test_mae_as_proposed"),
-        mean_predictor_mae=message.mean_predictor_mae,
-        mean_predictor_mae_as_proposed=_optional(message, "mean_predictor_mae_as_proposed"),
-        seal_ratio_mae=message.baseline_mae["seal_ratio"],
+        baselines=BaselineErrors(
+            dict(message.baseline_mae), dict(message.baseline_mae_as_proposed)
+        ),
         by_class={name: by_class[name] for name in CLASSES.tolist() if name in by_class},
         by_pictures=error_by_pictures(predicted, test_set),
         first_proposals=int((np.asarray(test_set.proposal_weight) > 0).sum()),

@@ -1,7 +1,8 @@
 """Cross-validation: a network for each fold, and the errors of all folds together."""
 
+import json
 from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +12,13 @@ from jaxtyping import Float
 from pipeline.config import RunConfig
 from pipeline.network.by_object import ObjectError, errors_by_object, interval_of_mean
 from pipeline.network.figures import mean_absolute_error
+from pipeline.network.fitted_baselines import baseline_errors, fit_baselines
 from pipeline.network.inference import predict
 from pipeline.network.resuming import EpochMetrics
 from pipeline.network.samples import Samples, join_samples
 from pipeline.network.training import train
 
+ARRAYS = ("quality", "single", "averaged")
 Part = tuple[Sequence[str], Samples]  # names that a fold's samples point into, and the samples
 
 
@@ -34,7 +37,7 @@ class TestedFold:
     averaged
         q̂ averaged over the symmetries, shape (n,).
     facts
-        Numbers of samples, best epoch and errors of the fold.
+        Numbers of samples, best epoch and errors of the fold, with those of the baselines.
     """
 
     __test__ = False  # not a test case, whatever its name
@@ -44,6 +47,19 @@ class TestedFold:
     single: Float[np.ndarray, " n"]
     averaged: Float[np.ndarray, " n"]
     facts: dict[str, Any]
+
+    def to_json(self) -> str:
+        """All of it as text."""
+        arrays = {name: getattr(self, name).tolist() for name in ARRAYS}
+        errors = [asdict(one) for one in self.errors]
+        return json.dumps({"errors": errors, **arrays, "facts": self.facts})
+
+    @classmethod
+    def from_json(cls, text: str) -> "TestedFold":
+        """Read back what `to_json` wrote."""
+        found = json.loads(text)
+        arrays = {name: np.array(found[name], dtype=np.float32) for name in ARRAYS}
+        return cls([ObjectError(**one) for one in found["errors"]], **arrays, facts=found["facts"])
 
 
 def train_and_test(
@@ -59,7 +75,7 @@ def train_and_test(
     Parameters
     ----------
     config
-        Sections network and train, and the seed.
+        Sections network, train and gripper, and the seed.
     parts
         Every fold, at least three.
     fold
@@ -110,6 +126,8 @@ def train_and_test(
         for averaging in (False, True)
     )
     quality, weight = samples.quality, samples.proposal_weight
+    fitted = fit_baselines(train_set, config.gripper, config.train.baseline_samples)
+    baselines = baseline_errors(fitted, samples)
     return TestedFold(
         errors=errors_by_object(names, samples.object_index, quality, single, averaged, weight),
         quality=quality,
@@ -122,6 +140,8 @@ def train_and_test(
             "best_epoch": trained.best_epoch,
             "val_mae": trained.val_mae,
             "mae_single": mean_absolute_error(single, quality),
+            "baselines": baselines.balanced,
+            "baselines_as_proposed": baselines.as_proposed,
         },
     )
 
@@ -171,6 +191,11 @@ def figures_of_folds(
         "grasps": len(quality),
         "mae": mean_absolute_error(averaged, quality),
         "mae_single": mean_absolute_error(single, quality),
+        "baselines": {
+            name: sum(found.facts["test"] * found.facts["baselines"][name] for found in done)
+            / len(quality)
+            for name in done[0].facts["baselines"]
+        },
         "macro": macro,
         "by_object": {one.name: {"fold": fold, **one.figures()} for fold, one in errors},
         "by_fold": {str(fold): found.facts for fold, found in enumerate(done)},

@@ -8,21 +8,19 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from pipeline.config.grasps import PadConfig
 from pipeline.config.learning import TrainConfig
 from pipeline.geometry.shape import ShapeClass
-from pipeline.network.baselines import (
-    fit_monotone,
-    mean_predictor_mae,
-    seal_ratio,
-    weighted_mean_predictor_mae,
-)
 from pipeline.network.figures import (
     calibration,
     error_by_group,
     error_by_quality_bin,
     mean_absolute_error,
     weighted_error,
+)
+from pipeline.network.fitted_baselines import (
+    BaselineErrors,
+    FittedBaselines,
+    baseline_errors,
 )
 from pipeline.network.ga_cnn import GaCnn
 from pipeline.network.inference import predict
@@ -49,12 +47,8 @@ class TestFigures:
     mae_as_proposed
         The error over grasps as the first round draws them (``Samples.proposal_weight``), where
         labels are not balanced; None where that is unknown.
-    mean_predictor_mae
-        Error of predicting the training samples' mean.
-    mean_predictor_mae_as_proposed
-        The same over grasps as the first round draws them; None where that is unknown.
-    seal_ratio_mae
-        Error of the baseline by `seal_ratio`.
+    baselines
+        The errors of what a network has to beat, fitted to the training samples.
     by_class
         Name of a shape class → error.
     by_pictures
@@ -80,9 +74,7 @@ class TestFigures:
     mae: float
     mae_single: float
     mae_as_proposed: float | None
-    mean_predictor_mae: float
-    mean_predictor_mae_as_proposed: float | None
-    seal_ratio_mae: float
+    baselines: BaselineErrors
     by_class: dict[str, float]
     by_pictures: dict[str, tuple[float, int]]
     first_proposals: int
@@ -98,9 +90,7 @@ class TestFigures:
             "test_mae": self.mae,
             "test_mae_single": self.mae_single,
             "test_mae_as_proposed": self.mae_as_proposed,
-            "mean_predictor_mae": self.mean_predictor_mae,
-            "mean_predictor_mae_as_proposed": self.mean_predictor_mae_as_proposed,
-            "seal_ratio_mae": self.seal_ratio_mae,
+            **self.baselines.summary(),
             "test_mae_by_class": self.by_class,
             "test_mae_by_pictures": {name: error for name, (error, _) in self.by_pictures.items()},
             "test_mae_by_tenth_of_q": self.by_tenth,
@@ -110,7 +100,7 @@ class TestFigures:
 def measure_held_out(
     network: GaCnn,
     config: TrainConfig,
-    pad: PadConfig,
+    fitted: FittedBaselines,
     train_set: Samples,
     val_set: Samples,
     test_set: Samples,
@@ -123,10 +113,10 @@ def measure_held_out(
         Trained on ``train_set``, best epoch chosen by ``val_set``.
     config
         Batch size and threads to predict with; whether symmetries are averaged over.
-    pad
-        Its r_v, r_G and steps, for the baseline by `seal_ratio`.
+    fitted
+        The baselines, fitted to ``train_set``.
     train_set
-        Training samples; the baselines are fitted on them.
+        Training samples.
     val_set
         Validation samples, of other objects.
     test_set
@@ -149,23 +139,13 @@ def measure_held_out(
         for averaging in (False, True)
     )
     predicted = averaged if config.augment else single
-    radius, tolerance = pad.seal_radius_m / pad.radius_m, pad.distance_step_m / pad.radius_m
-    train_ratio, test_ratio = (
-        seal_ratio(samples.cloud, samples.cloud_mask, radius, tolerance)
-        for samples in (train_set, test_set)
-    )
-    by_seal = fit_monotone(train_ratio, train_set.quality).predict(test_ratio)
     return TestFigures(
         quality=quality,
         predicted=predicted,
         mae=mean_absolute_error(predicted, quality),
         mae_single=mean_absolute_error(single, quality),
         mae_as_proposed=weighted_error(predicted, quality, test_set.proposal_weight),
-        mean_predictor_mae=mean_predictor_mae(train_set.quality, quality),
-        mean_predictor_mae_as_proposed=weighted_mean_predictor_mae(
-            train_set.quality, train_set.proposal_weight, quality, test_set.proposal_weight
-        ),
-        seal_ratio_mae=mean_absolute_error(by_seal, quality),
+        baselines=baseline_errors(fitted, test_set),
         by_class=error_by_group(predicted, quality, shape_class),
         by_pictures=error_by_pictures(predicted, test_set),
         first_proposals=int((np.asarray(test_set.proposal_weight) > 0).sum()),

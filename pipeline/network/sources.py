@@ -78,6 +78,11 @@ def quality_source(named: str, gripper: GripperConfig, threads: int) -> QualityS
     return QualitySource(name, predictor.predict, hashlib.sha256(data).hexdigest())
 
 
+def released_baseline(gripper: GripperConfig) -> AnalyticBaseline:
+    """The analytic baseline that is released with the network, for a gripper."""
+    return baseline_from_json(_bytes(RELEASED_FOLDER / BASELINE_FILE).decode(), gripper)
+
+
 def released_digests() -> dict[str, str]:
     """SHA-256 of each released file by its name, as the release wrote them down."""
     digests: dict[str, str] = json.loads((RELEASED_FOLDER / DIGESTS_FILE).read_text())

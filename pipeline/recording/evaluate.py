@@ -16,8 +16,15 @@ from pipeline.config import RunConfig
 from pipeline.config.grasps import PadConfig
 from pipeline.geometry.mesh import Mesh
 from pipeline.messages.objects import read_objects
+from pipeline.messages.proposed_contacts import worst_by_object
 from pipeline.messages.scenes import read_scenes
 from pipeline.recording import colours
+from pipeline.recording.proposed_contacts import (
+    WORST,
+    WORST_EACH,
+    errors_markdown,
+    show_worst,
+)
 from pipeline.recording.recording import (
     FinishedStage,
     eye_at,
@@ -27,7 +34,7 @@ from pipeline.recording.recording import (
     start_path,
     time_panel,
 )
-from pipeline.recording.results import curve_markdown, results_markdown
+from pipeline.recording.results import read_tables
 from pipeline.recording.robot import (
     GRIPPER,
     ShownRobot,
@@ -38,7 +45,7 @@ from pipeline.recording.robot import (
 )
 from pipeline.recording.shapes import shown_mesh, shown_pose
 from pipeline.spread import choose_evenly
-from schemas.softgrip.v1.evaluation_pb2 import Attempt, Comparison, DepthPicture, LevelResult
+from schemas.softgrip.v1.evaluation_pb2 import Attempt, DepthPicture, ProposedContacts
 
 TIMELINE = "frame"
 SHOWN_CANDIDATES = 60  # the best of them: more hide the scene
@@ -59,17 +66,21 @@ def draw_evaluate(stage: FinishedStage, figures: Mapping[str, Any]) -> None:
     }
     with open_artifact(stage.output) as artifact:
         attempts = [message for _, message in artifact.messages(Attempt)]
-        levels = [message for _, message in artifact.messages(LevelResult, "/levels")]
-        policies = [message for _, message in artifact.messages(LevelResult, "/policies")]
-        comparisons = [message for _, message in artifact.messages(Comparison)]
-        curve = [message for _, message in artifact.messages(LevelResult, "/imperfection")]
+        contacts = [message for _, message in artifact.messages(ProposedContacts)]
     ordered = worst_first(attempts)
     shown = [ordered[i] for i in choose_evenly(len(ordered), stage.config.recording.attempts)]
-    text = results_markdown(levels, policies, comparisons) + curve_markdown(curve)
+    text = read_tables(stage.output)
     scale = stage.config.gripper.pad.radius_m / PadConfig().radius_m
     view = blueprint(stage.config.evaluate.robot == "iiwa14", scale)
     with recording(stage, view) as stream:
         show_attempts(stream, shown, names, meshes, text, shown_robot(stage.config))
+        if analysis := figures.get("error_analysis"):
+            worst = worst_by_object(contacts, stage.config.evaluate.split, WORST_EACH)
+            show_worst(stream, worst, list(analysis["by_object"]))
+            errors = errors_markdown(analysis)
+            note = rr.TextDocument(errors, media_type=rr.MediaType.MARKDOWN)
+            stream.log("notes/errors", note, static=True)
+            text = f"{text}\n{errors}"
     publish_bytes(stage.output.with_suffix(".md"), text.encode())
 
 
@@ -96,10 +107,18 @@ def blueprint(with_arm: bool = False, scale: float = 1.0) -> rrb.Blueprint:
     target_m = (-0.2, 0.0, 0.25) if with_arm else (0.0, 0.0, 0.08 * scale)
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Spatial3DView(
-                origin="/world",
-                name="Scene, gripper and its path, candidates by q-hat",
-                eye_controls=eye_at(eye_m, target_m),
+            rrb.Tabs(
+                rrb.Spatial3DView(
+                    origin="/world",
+                    contents=["+ /world/**", f"- /{WORST}/**"],
+                    name="Scene, gripper and its path, candidates by q-hat",
+                    eye_controls=eye_at(eye_m, target_m),
+                ),
+                rrb.Spatial3DView(
+                    origin=f"/{WORST}",
+                    name="Worst objects, a row each: clouds with and without noise, units of r_G",
+                    eye_controls=eye_at((7.5, -18.0, 12.0), (7.5, -4.5, 0.0)),
+                ),
             ),
             rrb.Vertical(
                 rrb.TextDocumentView(origin="/notes/attempt", name="Attempt"),
@@ -113,6 +132,7 @@ def blueprint(with_arm: bool = False, scale: float = 1.0) -> rrb.Blueprint:
                 rrb.TimeSeriesView(origin="/curves/moment", name="moment at the base in N m"),
                 rrb.Tabs(
                     rrb.TextDocumentView(origin="/notes/result", name="Success"),
+                    rrb.TextDocumentView(origin="/notes/errors", name="Errors"),
                     rrb.TimeSeriesView(origin="/curves/state", name="State of the policy"),
                 ),
                 row_shares=[2, 3, 2, 2, 2],

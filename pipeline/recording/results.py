@@ -1,8 +1,27 @@
 """The results of an evaluation as Markdown tables."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
-from schemas.softgrip.v1.evaluation_pb2 import Comparison, LevelResult
+from pipeline.artifacts import open_artifact
+from pipeline.messages.proposed_contacts import Proposed
+from pipeline.recording.proposed_contacts import precision_markdown
+from schemas.softgrip.v1.evaluation_pb2 import Comparison, LevelResult, RankedPrecision
+
+
+def read_tables(path: Path) -> str:
+    """All tables of an evaluate artifact as Markdown: `results_markdown`, then precision."""
+    with open_artifact(path) as artifact:
+        levels = [message for _, message in artifact.messages(LevelResult, "/levels")]
+        policies = [message for _, message in artifact.messages(LevelResult, "/policies")]
+        comparisons = [message for _, message in artifact.messages(Comparison)]
+        curve = [message for _, message in artifact.messages(LevelResult, "/imperfection")]
+        precisions = [message for _, message in artifact.messages(RankedPrecision)]
+    tables = results_markdown(levels, policies, comparisons) + curve_markdown(curve)
+    if not precisions:
+        return tables
+    ranked = Proposed((), precisions, None).summary()["average_precision"]
+    return f"{tables}\n{precision_markdown(ranked)}"
 
 
 def results_markdown(

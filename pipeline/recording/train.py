@@ -11,6 +11,7 @@ from jaxtyping import Float, Integer
 from pipeline.artifacts import open_artifact
 from pipeline.messages.samples import read_split
 from pipeline.messages.training import figures_of, metrics_of
+from pipeline.network.fitted_baselines import MEAN, TITLES
 from pipeline.network.held_out import TestFigures
 from pipeline.network.resuming import EpochMetrics
 from pipeline.network.samples import Samples
@@ -86,7 +87,7 @@ def show_training(
         set_step(stream, TIMELINE, metrics.epoch)
         stream.log("curves/error/train", rr.Scalars(metrics.train_mae))
         stream.log("curves/error/val", rr.Scalars(metrics.val_mae))
-        stream.log("curves/error/mean_predictor", rr.Scalars(figures.mean_predictor_mae))
+        stream.log("curves/error/mean_predictor", rr.Scalars(figures.baselines.balanced[MEAN]))
         stream.log("curves/rate", rr.Scalars(metrics.learning_rate))
     show_calibration(stream, figures.quality, figures.predicted, figures.calibration)
     error = np.abs(figures.predicted - figures.quality)
@@ -103,21 +104,24 @@ def show_training(
 
 def result_table(figures: TestFigures) -> str:
     """The errors on held-out objects, as a person reads them (Markdown)."""
+    errors = figures.baselines
     rows = [
         ("**GA-CNN**", f"**{figures.mae:.4f}**", len(figures.quality)),
         ("of one prediction a grasp", f"{figures.mae_single:.4f}", len(figures.quality)),
-        ("seal ratio alone", f"{figures.seal_ratio_mae:.4f}", len(figures.quality)),
-        ("mean predictor", f"{figures.mean_predictor_mae:.4f}", len(figures.quality)),
+        *(
+            (name, f"{errors.balanced[key]:.4f}", len(figures.quality))
+            for key, name in TITLES.items()
+            if key in errors.balanced
+        ),
     ]
-    as_proposed = [
-        ("GA-CNN over grasps as first proposed", figures.mae_as_proposed),
-        ("mean predictor over the same", figures.mean_predictor_mae_as_proposed),
-    ]
-    rows += [
-        (name, f"{error:.4f}", figures.first_proposals)
-        for name, error in as_proposed
-        if error is not None
-    ]
+    if figures.mae_as_proposed is not None:
+        count = figures.first_proposals
+        rows += [("GA-CNN over grasps as first proposed", f"{figures.mae_as_proposed:.4f}", count)]
+        rows += [
+            (f"{name} over the same", f"{errors.as_proposed[key]:.4f}", count)
+            for key, name in TITLES.items()
+            if key in errors.as_proposed
+        ]
     rows += [
         (f"GA-CNN on clouds cut from {pictures}", f"{error:.4f}", count)
         for pictures, (error, count) in figures.by_pictures.items()

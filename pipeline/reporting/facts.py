@@ -1,6 +1,7 @@
 """Facts of a run for its report, from provenance, summaries and a few artifacts."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,7 +10,9 @@ import numpy as np
 
 from pipeline.artifacts import Provenance, from_tensor, open_artifact, read_provenance
 from pipeline.errors import ArtifactError
-from schemas.softgrip.v1.evaluation_pb2 import Attempt, LevelResult
+from pipeline.messages.proposed_contacts import WorstContact, worst_by_object
+from pipeline.recording.proposed_contacts import WORST_EACH
+from schemas.softgrip.v1.evaluation_pb2 import Attempt, LevelResult, ProposedContacts
 from schemas.softgrip.v1.objects_pb2 import CatalogueObject, RefusedMesh
 from schemas.softgrip.v1.training_pb2 import Epoch, TrainingResult
 
@@ -106,6 +109,28 @@ def read_training(path: Path) -> TrainingFacts:
         val_mae=tuple(epoch.val_mae for epoch in epochs),
         calibration=tuple((p, q, int(n)) for p, q, n in rows if np.isfinite([p, q]).all()),
     )
+
+
+def read_worst(path: Path, split: str, ordered: Sequence[str]) -> dict[str, list[WorstContact]]:
+    """Worst contacts of the worst objects in an evaluate artifact.
+
+    Parameters
+    ----------
+    path
+        The artifact.
+    split
+        Whose objects.
+    ordered
+        Objects by falling error.
+
+    Returns
+    -------
+    Object → its worst contacts, in that order; those of which none was kept are left out.
+    """
+    with open_artifact(path) as artifact:
+        messages = [message for _, message in artifact.messages(ProposedContacts)]
+    found = worst_by_object(messages, split, WORST_EACH)
+    return {name: found[name] for name in ordered if name in found}
 
 
 def read_success(path: Path) -> dict[str, dict[int, LevelResult]]:

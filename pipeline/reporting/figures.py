@@ -4,8 +4,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from pipeline.execution import RunFolder
+from pipeline.recording.proposed_contacts import errors_markdown, precision_markdown
 from pipeline.reporting import plots
-from pipeline.reporting.facts import CatalogueFacts, read_training
+from pipeline.reporting.facts import CatalogueFacts, read_training, read_worst
 from schemas.softgrip.v1.evaluation_pb2 import LevelResult
 
 
@@ -54,12 +55,26 @@ def figures_of(
                 for policy, by_scale in curve.items()
             }
         )
+    if analysis := (summaries["evaluate"] or {}).get("error_analysis"):
+        path, ordered = folder.artifact("evaluate"), list(analysis["by_object"])
+        if worst := read_worst(path, analysis["split"], ordered):
+            svg["worst"] = plots.worst_contacts(worst)
     if referee:
         svg["load"] = plots.load_by_quality(referee["by_tenth"])
     svg["timings"] = plots.wall_times(
         {name: found["wall_time_s"] for name, found in summaries.items() if found}
     )
     return svg
+
+
+def proposed_tables(evaluate: dict[str, Any] | None) -> dict[str, str]:
+    """Average precision and error analysis as Markdown; empty where they were not made."""
+    found = evaluate or {}
+    ranked, analysis = found.get("average_precision"), found.get("error_analysis")
+    return {
+        "precision": precision_markdown(ranked) if ranked else "",
+        "errors": errors_markdown(analysis) if analysis else "",
+    }
 
 
 def overall_rates(evaluate: dict[str, Any] | None) -> dict[str, Any]:

@@ -11,12 +11,15 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from pipeline.geometry.shape import COMPLEX_FROM, TYPICAL_FROM
+from pipeline.messages.proposed_contacts import WorstContact
 from pipeline.recording.colours import PALETTE, SHAPE_CLASS, SPLIT
+from pipeline.recording.proposed_contacts import WORST_EACH, WORST_OBJECTS
 
 MARKERS = "osD^vPX*"
 DASHES = ("-", "--", "-.", ":")
@@ -235,6 +238,28 @@ def load_by_quality(by_tenth: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
             axes.set_ylim(bottom=0)
         panels[0].set_ylabel("weight borne [N], quartiles")
         return _svg(figure)
+
+
+def worst_contacts(by_object: Mapping[str, Sequence[WorstContact]]) -> str:
+    """Heights under the pad of the worst contacts, an object a row, without noise beside each."""
+    rows = list(by_object.items())[:WORST_OBJECTS]
+    with mpl.rc_context(STYLE | {"axes.grid": False, "font.size": 7}):
+        figure = Figure(figsize=(WIDTH_IN, 1.3 * len(rows)), layout="constrained")
+        grid = figure.subplots(len(rows), 2 * WORST_EACH, squeeze=False)
+        for axes in grid.flat:
+            axes.set_axis_off()
+        for line, (name, contacts) in zip(grid, rows, strict=True):
+            for number, one in enumerate(contacts[:WORST_EACH]):
+                _heights(line[2 * number], one.cloud)
+                _heights(line[2 * number + 1], one.cloud_without_noise)
+                title = f"q {one.quality:.2f}, q-hat {one.predicted:.2f}"
+                line[2 * number].set_title(f"{name}\n{title}" if number == 0 else f"\n{title}")
+                line[2 * number + 1].set_title(f"\nq-hat {one.predicted_without_noise:.2f}")
+        return _svg(figure)
+
+
+def _heights(axes: Axes, cloud: Float[np.ndarray, "g g 3"]) -> None:
+    axes.imshow(cloud[..., 2], cmap="viridis", vmin=-1.0, vmax=1.0, interpolation="nearest")
 
 
 def wall_times(seconds: Mapping[str, float]) -> str:

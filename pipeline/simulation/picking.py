@@ -161,7 +161,7 @@ def run_clutter(
     policy
         Name of the policy.
     predict
-        Network that rates grasps.
+        Rates grasps for this policy, see `build_strategy`.
     config
         The run; section evaluate holds the limits.
     rng

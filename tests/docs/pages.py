@@ -32,6 +32,14 @@ REDUCED = {
         "make -n train RUN=first MESH_DIR=meshes",
         "the test's folder holds three meshes; README's commands train run ci from nothing",
     ),
+    "make train RUN=copies-0 MESH_DIR=meshes": (
+        "make -n train RUN=copies-0 MESH_DIR=meshes",
+        "a training of minutes",
+    ),
+    "grep val_mae runs/copies-0/train.summary.json": (
+        "grep 'stretched_copies = 0' runs/copies-0/run.toml",
+        "the training before it is not run",
+    ),
     "make real FRAMES=runs/pictures": (
         "make -n real FRAMES=runs/pictures",
         "tests/stages/test_real.py runs it on smaller frames",

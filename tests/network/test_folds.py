@@ -57,12 +57,20 @@ def test_every_object_is_tested_once_by_a_network_of_other_folds(
     for fold, (train_set, val_set) in enumerate(given):
         np.testing.assert_array_equal(val_set.quality, parts[(fold + 1) % 3][1].quality)
         np.testing.assert_array_equal(train_set.quality, parts[(fold + 2) % 3][1].quality)
+    kept = [folds.TestedFold.from_json(one.to_json()) for one in done]
+    for one, again in zip(done, kept, strict=True):
+        assert again.errors == one.errors
+        assert again.facts == one.facts
+        for name in folds.ARRAYS:
+            np.testing.assert_array_equal(getattr(again, name), getattr(one, name))
     families = {name: name for name in tested}
     found = figures_of_folds(done, families, 200, np.random.default_rng(0))
     assert set(found["by_object"]) == tested
     assert {one["fold"] for one in found["by_object"].values()} == {0, 1, 2}
     assert found["grasps"] == 3 * 16
     errors = [one["mae"] for one in found["by_object"].values()]
+    median = found["baselines"]["median"]
+    assert median == pytest.approx(np.mean([one.facts["baselines"]["median"] for one in done]))
     every = found["macro"]["all objects, labels balanced over q"]
     assert every["mae"] == pytest.approx(np.mean(errors))
     low, high = every["interval_95"]

@@ -1,13 +1,27 @@
-"""Which clutters are picked."""
+"""Which clutters are picked, what rates grasps for each policy, and what contacts come to."""
 
+import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from pipeline.artifacts import from_tensor, open_artifact
+from pipeline.config import load_run_config
+from pipeline.config.evaluation import PolicyName
 from pipeline.execution import RunFolder
 from pipeline.execution.staleness import stage_context
+from pipeline.labelling.poses import label_poses
+from pipeline.labelling.scene import scene_surfaces
+from pipeline.messages.objects import read_objects
+from pipeline.messages.samples import read_split
+from pipeline.messages.scenes import read_scenes
+from pipeline.messages.trained import rates_for
+from pipeline.network.sources import baseline_from_json
+from pipeline.simulation.proposed_contacts import propose_contacts
+from schemas.softgrip.v1.evaluation_pb2 import ProposedContacts
 from stages.evaluate import clutters
-from stages.graph import EVALUATE, inputs_of
+from stages.graph import EVALUATE, GIVEN_NETWORK, inputs_of
 
 
 @pytest.mark.parametrize("split", ["val", "test"])
@@ -17,3 +31,105 @@ def test_clutters_are_of_the_split_that_is_asked_for(run: RunFolder, split: str)
     config = context.config.model_copy(update={"evaluate": wanted})
     found = clutters(replace(context, config=config))
     assert [scene.split for scene in found] == [split]
+
+
+def test_the_analytic_policy_asks_the_baseline_that_was_fitted_to_the_train_split(
+    run: RunFolder,
+) -> None:
+    context = stage_context(EVALUATE, run, inputs_of, None, workers=1)
+    gripper = context.config.gripper
+    samples = read_split(run.artifact("shards"), "test").take(slice(0, 8))
+    fitted = baseline_from_json((run.path / "train" / "analytic.json").read_text(), gripper)
+    policies: tuple[tuple[PolicyName, bool], ...] = (
+        ("analytic", True),
+        ("closed-loop", False),
+        ("open-loop", False),
+    )
+    for policy, same in policies:
+        score = rates_for(policy, run.artifact("train"), gripper)
+        found = score(samples.cloud, samples.cloud_mask)
+        expected = fitted.predict(samples.cloud, samples.cloud_mask)
+        assert np.array_equal(found, expected) is same, policy
+    # Beside a given network there is no training: the released baseline stands in.
+    beside = rates_for("analytic", run.path / GIVEN_NETWORK, gripper)
+    assert not np.array_equal(beside(samples.cloud, samples.cloud_mask), expected)
+
+
+@pytest.fixture(scope="module")
+def contacts(run: RunFolder) -> list[ProposedContacts]:
+    with open_artifact(run.artifact("evaluate")) as artifact:
+        return [message for _, message in artifact.messages(ProposedContacts)]
+
+
+def test_contacts_of_seen_and_unseen_families_are_rated(
+    run: RunFolder, contacts: list[ProposedContacts]
+) -> None:
+    assert sorted(message.split for message in contacts) == ["test", "train", "train"]
+    figures = json.loads(run.summary("evaluate").read_text())
+    for by_ranking in figures["average_precision"].values():
+        best, any_order = by_ranking["best order"], by_ranking["any order"]
+        assert best["AP"] >= any_order["AP"]
+        assert best["AP"] == pytest.approx(
+            np.mean([value for name, value in best.items() if name.startswith("AP_")])
+        )
+    assert "### Ranked contacts" in run.artifact("evaluate").with_suffix(".md").read_text()
+
+
+def test_contacts_are_worth_what_algorithm_1_says_at_their_poses(
+    run: RunFolder, contacts: list[ProposedContacts]
+) -> None:
+    """Labelled anew, one by one, in the scene that the run made."""
+    config = load_run_config(run.config)
+    objects = {name: item for name, (item, _) in read_objects(run.artifact("objects")).items()}
+    message = next(message for message in contacts if message.split == "test")
+    scene = next(s for s in read_scenes(run.artifact("scenes")) if s.scene_id == message.scene_id)
+    body_of = {item.object_name: item.body_id for item in scene.objects}
+    meshes = {name: item.mesh for name, item in objects.items()}
+    surfaces = scene_surfaces(scene, meshes, config.scenes.table_side_m)
+    index, quality = from_tensor(message.object_index), from_tensor(message.quality)
+    poses = from_tensor(message.world_from_contact).astype(np.float64)
+    assert (quality[index < 0] == 0).all()
+    for row in np.flatnonzero(index >= 0)[:12]:
+        body = np.array([body_of[message.object_names[index[row]]]])
+        label = label_poses(
+            poses[row][None], body, surfaces, config.gripper, config.grasps.clearance_m
+        )
+        # Poses are kept in single precision, and a contact at a tolerance's end may go either way.
+        assert label.q[0] == pytest.approx(quality[row], abs=0.05)
+
+
+def test_errors_are_those_of_the_contacts_on_unseen_families(
+    run: RunFolder, contacts: list[ProposedContacts]
+) -> None:
+    own = [message for message in contacts if message.split == "test"]
+    quality = np.concatenate([from_tensor(message.quality) for message in own])
+    analysis = json.loads(run.summary("evaluate").read_text())["error_analysis"]
+    assert analysis["all"]["grasps"] == len(quality)
+    for name, error in analysis["all"]["errors"].items():
+        if name in own[0].predicted:
+            found = np.concatenate([from_tensor(message.predicted[name]) for message in own])
+            assert error == pytest.approx(np.abs(found - quality).mean(), abs=1e-6)
+    on_objects = sum(row["grasps"] for row in analysis["by_object"].values())
+    assert on_objects == sum(int((from_tensor(m.object_index) >= 0).sum()) for m in own)
+    message = own[0]
+    network = from_tensor(message.predicted["network"])
+    wrong = np.abs(network - from_tensor(message.quality))
+    worst = from_tensor(message.worst)
+    assert wrong[worst] == pytest.approx(np.sort(wrong)[::-1][: len(worst)])
+    assert from_tensor(message.worst_cloud).shape == (len(worst), 24, 24, 3)
+
+
+def test_without_noise_both_predictions_of_the_network_are_one(run: RunFolder) -> None:
+    config = load_run_config(run.config)
+    exact = config.model_copy(
+        update={"sensing": config.sensing.model_copy(update={"disturbed": False})}
+    )
+    meshes = {name: one.mesh for name, (one, _) in read_objects(run.artifact("objects")).items()}
+    scene = next(iter(read_scenes(run.artifact("scenes"))))
+    # In the network's place, for one of two epochs says the same of every cloud.
+    analytic = rates_for("analytic", run.artifact("train"), config.gripper)
+    for chosen, same in ((exact, True), (config, False)):
+        rng = np.random.default_rng(0)
+        found = propose_contacts(scene, meshes, analytic, analytic, chosen, rng)
+        seen, without = (found.predicted[name] for name in ("network", "network, without noise"))
+        assert np.array_equal(seen, without) is same

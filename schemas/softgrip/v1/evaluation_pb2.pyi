@@ -99,6 +99,75 @@ class TriedContact(_message.Message):
     pictures: int
     def __init__(self, world_from_contact: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., predicted_quality: _Optional[float] = ..., held: _Optional[bool] = ..., lifted: _Optional[bool] = ..., cloud: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., cloud_mask: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., pictures: _Optional[int] = ...) -> None: ...
 
+class ProposedContacts(_message.Message):
+    __slots__ = ("scene_id", "level", "split", "object_names", "world_from_contact", "object_index", "quality", "tilt_rad", "edge_rg", "value", "predicted", "worst", "worst_cloud", "worst_cloud_without_noise")
+    class ValueEntry(_message.Message):
+        __slots__ = ("key", "value")
+        KEY_FIELD_NUMBER: _ClassVar[int]
+        VALUE_FIELD_NUMBER: _ClassVar[int]
+        key: str
+        value: _tensor_pb2.Tensor
+        def __init__(self, key: _Optional[str] = ..., value: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ...) -> None: ...
+    class PredictedEntry(_message.Message):
+        __slots__ = ("key", "value")
+        KEY_FIELD_NUMBER: _ClassVar[int]
+        VALUE_FIELD_NUMBER: _ClassVar[int]
+        key: str
+        value: _tensor_pb2.Tensor
+        def __init__(self, key: _Optional[str] = ..., value: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ...) -> None: ...
+    SCENE_ID_FIELD_NUMBER: _ClassVar[int]
+    LEVEL_FIELD_NUMBER: _ClassVar[int]
+    SPLIT_FIELD_NUMBER: _ClassVar[int]
+    OBJECT_NAMES_FIELD_NUMBER: _ClassVar[int]
+    WORLD_FROM_CONTACT_FIELD_NUMBER: _ClassVar[int]
+    OBJECT_INDEX_FIELD_NUMBER: _ClassVar[int]
+    QUALITY_FIELD_NUMBER: _ClassVar[int]
+    TILT_RAD_FIELD_NUMBER: _ClassVar[int]
+    EDGE_RG_FIELD_NUMBER: _ClassVar[int]
+    VALUE_FIELD_NUMBER: _ClassVar[int]
+    PREDICTED_FIELD_NUMBER: _ClassVar[int]
+    WORST_FIELD_NUMBER: _ClassVar[int]
+    WORST_CLOUD_FIELD_NUMBER: _ClassVar[int]
+    WORST_CLOUD_WITHOUT_NOISE_FIELD_NUMBER: _ClassVar[int]
+    scene_id: str
+    level: int
+    split: str
+    object_names: _containers.RepeatedScalarFieldContainer[str]
+    world_from_contact: _tensor_pb2.Tensor
+    object_index: _tensor_pb2.Tensor
+    quality: _tensor_pb2.Tensor
+    tilt_rad: _tensor_pb2.Tensor
+    edge_rg: _tensor_pb2.Tensor
+    value: _containers.MessageMap[str, _tensor_pb2.Tensor]
+    predicted: _containers.MessageMap[str, _tensor_pb2.Tensor]
+    worst: _tensor_pb2.Tensor
+    worst_cloud: _tensor_pb2.Tensor
+    worst_cloud_without_noise: _tensor_pb2.Tensor
+    def __init__(self, scene_id: _Optional[str] = ..., level: _Optional[int] = ..., split: _Optional[str] = ..., object_names: _Optional[_Iterable[str]] = ..., world_from_contact: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., object_index: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., quality: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., tilt_rad: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., edge_rg: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., value: _Optional[_Mapping[str, _tensor_pb2.Tensor]] = ..., predicted: _Optional[_Mapping[str, _tensor_pb2.Tensor]] = ..., worst: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., worst_cloud: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., worst_cloud_without_noise: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ...) -> None: ...
+
+class RankedPrecision(_message.Message):
+    __slots__ = ("ranking", "split", "scenes", "average_precision", "by_threshold", "judged")
+    class ByThresholdEntry(_message.Message):
+        __slots__ = ("key", "value")
+        KEY_FIELD_NUMBER: _ClassVar[int]
+        VALUE_FIELD_NUMBER: _ClassVar[int]
+        key: str
+        value: float
+        def __init__(self, key: _Optional[str] = ..., value: _Optional[float] = ...) -> None: ...
+    RANKING_FIELD_NUMBER: _ClassVar[int]
+    SPLIT_FIELD_NUMBER: _ClassVar[int]
+    SCENES_FIELD_NUMBER: _ClassVar[int]
+    AVERAGE_PRECISION_FIELD_NUMBER: _ClassVar[int]
+    BY_THRESHOLD_FIELD_NUMBER: _ClassVar[int]
+    JUDGED_FIELD_NUMBER: _ClassVar[int]
+    ranking: str
+    split: str
+    scenes: int
+    average_precision: float
+    by_threshold: _containers.ScalarMap[str, float]
+    judged: float
+    def __init__(self, ranking: _Optional[str] = ..., split: _Optional[str] = ..., scenes: _Optional[int] = ..., average_precision: _Optional[float] = ..., by_threshold: _Optional[_Mapping[str, float]] = ..., judged: _Optional[float] = ...) -> None: ...
+
 class DepthPicture(_message.Message):
     __slots__ = ("camera", "depth_mm", "intrinsics", "world_from_camera", "step", "left_px", "top_px", "whole_width_px", "whole_height_px")
     CAMERA_FIELD_NUMBER: _ClassVar[int]

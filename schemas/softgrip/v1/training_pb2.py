@@ -25,7 +25,7 @@ _sym_db = _symbol_database.Default()
 from schemas.softgrip.v1 import tensor_pb2 as schemas_dot_softgrip_dot_v1_dot_tensor__pb2
 
 
-DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\"schemas/softgrip/v1/training.proto\x12\x0bsoftgrip.v1\x1a schemas/softgrip/v1/tensor.proto\"v\n\x05\x45poch\x12\r\n\x05\x65poch\x18\x01 \x01(\r\x12\x12\n\ntrain_loss\x18\x02 \x01(\x01\x12\x0f\n\x07val_mae\x18\x03 \x01(\x01\x12\x15\n\rlearning_rate\x18\x04 \x01(\x01\x12\x11\n\ttrain_mae\x18\x05 \x01(\x01\x12\x0f\n\x07samples\x18\x06 \x01(\x04\"\xa9\x08\n\x0eTrainingResult\x12\x0e\n\x06layers\x18\x01 \x01(\r\x12\x10\n\x08\x63hannels\x18\x02 \x03(\r\x12\x12\n\nparameters\x18\x03 \x01(\x04\x12\x12\n\nbest_epoch\x18\x04 \x01(\r\x12\x10\n\x08test_mae\x18\x05 \x01(\x01\x12\x1a\n\x12mean_predictor_mae\x18\x06 \x01(\x01\x12\x42\n\x0c\x62\x61seline_mae\x18\x07 \x03(\x0b\x32,.softgrip.v1.TrainingResult.BaselineMaeEntry\x12J\n\x11test_mae_by_class\x18\x08 \x03(\x0b\x32/.softgrip.v1.TrainingResult.TestMaeByClassEntry\x12.\n\x11test_mae_by_tenth\x18\t \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12(\n\x0b\x63\x61libration\x18\n \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12)\n\x0ctest_quality\x18\x0b \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12,\n\x0ftest_prediction\x18\x0c \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12\x0f\n\x07val_mae\x18\r \x01(\x01\x12\x17\n\x0ftest_mae_single\x18\x0e \x01(\x01\x12N\n\x13test_count_by_class\x18\x0f \x03(\x0b\x32\x31.softgrip.v1.TrainingResult.TestCountByClassEntry\x12\x13\n\x0btrain_count\x18\x10 \x01(\x04\x12\x11\n\tval_count\x18\x11 \x01(\x04\x12!\n\x14test_mae_as_proposed\x18\x12 \x01(\x01H\x00\x88\x01\x01\x12+\n\x1emean_predictor_mae_as_proposed\x18\x13 \x01(\x01H\x01\x88\x01\x01\x12P\n\x14test_mae_by_pictures\x18\x14 \x03(\x0b\x32\x32.softgrip.v1.TrainingResult.TestMaeByPicturesEntry\x1a\x32\n\x10\x42\x61selineMaeEntry\x12\x0b\n\x03key\x18\x01 \x01(\t\x12\r\n\x05value\x18\x02 \x01(\x01:\x02\x38\x01\x1a\x35\n\x13TestMaeByClassEntry\x12\x0b\n\x03key\x18\x01 \x01(\t\x12\r\n\x05value\x18\x02 \x01(\x01:\x02\x38\x01\x1a\x37\n\x15TestCountByClassEntry\x12\x0b\n\x03key\x18\x01 \x01(\t\x12\r\n\x05value\x18\x02 \x01(\x04:\x02\x38\x01\x1a\x38\n\x16TestMaeByPicturesEntry\x12\x0b\n\x03key\x18\x01 \x01(\t\x12\r\n\x05value\x18\x02 \x01(\x01:\x02\x38\x01\x42\x17\n\x15_test_mae_as_proposedB!\n\x1f_mean_predictor_mae_as_proposed\"\xd0\x03\n\x0cSweepNetwork\x12\r\n\x05group\x18\x01 \x01(\t\x12\x0f\n\x07variant\x18\x02 \x01(\t\x12\x0e\n\x06layers\x18\x03 \x01(\r\x12\x10\n\x08\x63hannels\x18\x04 \x03(\r\x12\x0c\n\x04seed\x18\x05 \x01(\x04\x12\x12\n\nparameters\x18\x06 \x01(\x04\x12\x15\n\rmultiply_adds\x18\x07 \x01(\x04\x12\x0f\n\x07val_mae\x18\x08 \x01(\x01\x12\x16\n\x0eval_mae_spread\x18\t \x01(\x01\x12\x10\n\x08test_mae\x18\n \x01(\x01\x12\x17\n\x0ftest_mae_single\x18\x0b \x01(\x01\x12\x19\n\x11test_mae_averaged\x18\x11 \x01(\x01\x12H\n\x11test_mae_by_class\x18\x0c \x03(\x0b\x32-.softgrip.v1.SweepNetwork.TestMaeByClassEntry\x12\x12\n\nbest_epoch\x18\r \x01(\r\x12!\n\x05\x63urve\x18\x0e \x03(\x0b\x32\x12.softgrip.v1.Epoch\x12\x0e\n\x06\x63hosen\x18\x0f \x01(\x08\x12\x0e\n\x06of_run\x18\x10 \x01(\x08\x1a\x35\n\x13TestMaeByClassEntry\x12\x0b\n\x03key\x18\x01 \x01(\t\x12\r\n\x05value\x18\x02 \x01(\x01:\x02\x38\x01\"\x8f\x01\n\x0bSweepBudget\x12\x15\n\rtrain_samples\x18\x01 \x01(\x04\x12\x13\n\x0bval_samples\x18\x02 \x01(\x04\x12\x14\n\x0ctest_samples\x18\x03 \x01(\x04\x12\x0e\n\x06\x65pochs\x18\x04 \x01(\r\x12\x12\n\nbatch_size\x18\x05 \x01(\r\x12\x1a\n\x12mean_predictor_mae\x18\x06 \x01(\x01\x62\x06proto3')
+DESCRIPTOR = _descriptor_pool.Default().AddSerializedFile(b'\n\"schemas/softgrip/v1/training.proto\x12\x0bsoftgrip.v1\x1a schemas/softgrip/v1/tensor.proto\"v\n\x05\x45poch\x12\r\n\x05\x65poch\x18\x01 \x01(\r\x12\x12\n\ntrain_loss\x18\x02 \x01(\x01\x12\x0f\n\x07val_mae\x18\x03 \x01(\x01\x12\x15\n\rlearning_rate\x18\x04 \x01(\x01\x12\x11\n\ttrain_mae\x18\x05 \x01(\x01\x12\x0f\n\x07samples\x18\x06 \x01(\x04\"\xc1\t\n\x0eTrainingResult\x12\x0e\n\x06layers\x18\x01 \x01(\r\x12\x10\n\x08\x63hannels\x18\x02 \x03(\r\x12\x12\n\nparameters\x18\x03 \x01(\x04\x12\x12\n\nbest_epoch\x18\x04 \x01(\r\x12\x10\n\x08test_mae\x18\x05 \x01(\x01\x12\x1a\n\x12mean_predictor_mae\x18\x06 \x01(\x01\x12\x42\n\x0c\x62\x61seline_mae\x18\x07 \x03(\x0b\x32,.softgrip.v1.TrainingResult.BaselineMaeEntry\x12J\n\x11test_mae_by_class\x18\x08 \x03(\x0b\x32/.softgrip.v1.TrainingResult.TestMaeByClassEntry\x12.\n\x11test_mae_by_tenth\x18\t \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12(\n\x0b\x63\x61libration\x18\n \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12)\n\x0ctest_quality\x18\x0b \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12,\n\x0ftest_prediction\x18\x0c \x01(\x0b\x32\x13.softgrip.v1.Tensor\x12\x0f\n\x07val_mae\x18\r \x01(\x01\x12\x17\n\x0ftest_mae_single\x18\x0e \x01(\x01\x12N\n\x13test_count_by_class\x18\x0f \x03(\x0b\x32\x31.softgrip.v1.TrainingResult.TestCountByClassEntry\x12\x13\n\x0btrain_count\x18\x10 \x01(\x04\x12\x11\n\tval_count\x18\x11 \x01(\x04\x12!\n\x14test_mae_as_proposed\x18\x12 \x01(\x01H\x00\x88\x01\x01\x12+\n\x1emean_predictor_mae_as_proposed\x18\x13 \x01(\x01H\x01\x88\x01\x01\x12X\n\x18\x62\x61seline_mae_as_proposed\x18\x15 \x03(\x0b\x32\x36.softgrip.v1.TrainingResult.BaselineMaeAsProposedEntry\x12P\n\x14test_mae_by_pictures\x18\x14 \x03(\x0b\x32\x32.softgrip.v1.TrainingResult.TestMaeByPicturesEntry\x1a\x32\n\x10\x42\x61selineMaeEntry\x12\x0b\n\x03key\x18\x01 \x01(\t\x12\r\n\x05value\x18\x02 \x01(\x01:\x02\x38\x01\x1a\x35\n\x13TestMaeByClassEntry\x12\x0b\n\x03key\x18\x01 \x01(\t\x12\r\n\x05value\x18\x02 \x01(\x01:\x02\x38\x01\x1a\x37\n\x15TestCountByClassEntry\x12\x0b\n\x03key\x18\x01 \x01(\t\x12\r\n\x05value\x18\x02 \x01(\x04:\x02\x38\x01\x1a<\n\x1a\x42\x61selineMaeAsProposedEntry\x12\x0b\n\x03key\x18\x01 \x01(\t\x12\r\n\x05value\x18\x02 \x01(\x01:\x02\x38\x01\x1a\x38\n\x16TestMaeByPicturesEntry\x12\x0b\n\x03key\x18\x01 \x01(\t\x12\r\n\x05value\x18\x02 \x01(\x01:\x02\x38\x01\x42\x17\n\x15_test_mae_as_proposedB!\n\x1f_mean_predictor_mae_as_proposed\"\xd0\x03\n\x0cSweepNetwork\x12\r\n\x05group\x18\x01 \x01(\t\x12\x0f\n\x07variant\x18\x02 \x01(\t\x12\x0e\n\x06layers\x18\x03 \x01(\r\x12\x10\n\x08\x63hannels\x18\x04 \x03(\r\x12\x0c\n\x04seed\x18\x05 \x01(\x04\x12\x12\n\nparameters\x18\x06 \x01(\x04\x12\x15\n\rmultiply_adds\x18\x07 \x01(\x04\x12\x0f\n\x07val_mae\x18\x08 \x01(\x01\x12\x16\n\x0eval_mae_spread\x18\t \x01(\x01\x12\x10\n\x08test_mae\x18\n \x01(\x01\x12\x17\n\x0ftest_mae_single\x18\x0b \x01(\x01\x12\x19\n\x11test_mae_averaged\x18\x11 \x01(\x01\x12H\n\x11test_mae_by_class\x18\x0c \x03(\x0b\x32-.softgrip.v1.SweepNetwork.TestMaeByClassEntry\x12\x12\n\nbest_epoch\x18\r \x01(\r\x12!\n\x05\x63urve\x18\x0e \x03(\x0b\x32\x12.softgrip.v1.Epoch\x12\x0e\n\x06\x63hosen\x18\x0f \x01(\x08\x12\x0e\n\x06of_run\x18\x10 \x01(\x08\x1a\x35\n\x13TestMaeByClassEntry\x12\x0b\n\x03key\x18\x01 \x01(\t\x12\r\n\x05value\x18\x02 \x01(\x01:\x02\x38\x01\"\x8f\x01\n\x0bSweepBudget\x12\x15\n\rtrain_samples\x18\x01 \x01(\x04\x12\x13\n\x0bval_samples\x18\x02 \x01(\x04\x12\x14\n\x0ctest_samples\x18\x03 \x01(\x04\x12\x0e\n\x06\x65pochs\x18\x04 \x01(\r\x12\x12\n\nbatch_size\x18\x05 \x01(\r\x12\x1a\n\x12mean_predictor_mae\x18\x06 \x01(\x01\x62\x06proto3')
 
 _globals = globals()
 _builder.BuildMessageAndEnumDescriptors(DESCRIPTOR, _globals)
@@ -38,6 +38,8 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_TRAININGRESULT_TESTMAEBYCLASSENTRY']._serialized_options = b'8\001'
   _globals['_TRAININGRESULT_TESTCOUNTBYCLASSENTRY']._loaded_options = None
   _globals['_TRAININGRESULT_TESTCOUNTBYCLASSENTRY']._serialized_options = b'8\001'
+  _globals['_TRAININGRESULT_BASELINEMAEASPROPOSEDENTRY']._loaded_options = None
+  _globals['_TRAININGRESULT_BASELINEMAEASPROPOSEDENTRY']._serialized_options = b'8\001'
   _globals['_TRAININGRESULT_TESTMAEBYPICTURESENTRY']._loaded_options = None
   _globals['_TRAININGRESULT_TESTMAEBYPICTURESENTRY']._serialized_options = b'8\001'
   _globals['_SWEEPNETWORK_TESTMAEBYCLASSENTRY']._loaded_options = None
@@ -45,19 +47,21 @@ if not _descriptor._USE_C_DESCRIPTORS:
   _globals['_EPOCH']._serialized_start=85
   _globals['_EPOCH']._serialized_end=203
   _globals['_TRAININGRESULT']._serialized_start=206
-  _globals['_TRAININGRESULT']._serialized_end=1271
-  _globals['_TRAININGRESULT_BASELINEMAEENTRY']._serialized_start=991
-  _globals['_TRAININGRESULT_BASELINEMAEENTRY']._serialized_end=1041
-  _globals['_TRAININGRESULT_TESTMAEBYCLASSENTRY']._serialized_start=1043
-  _globals['_TRAININGRESULT_TESTMAEBYCLASSENTRY']._serialized_end=1096
-  _globals['_TRAININGRESULT_TESTCOUNTBYCLASSENTRY']._serialized_start=1098
-  _globals['_TRAININGRESULT_TESTCOUNTBYCLASSENTRY']._serialized_end=1153
-  _globals['_TRAININGRESULT_TESTMAEBYPICTURESENTRY']._serialized_start=1155
-  _globals['_TRAININGRESULT_TESTMAEBYPICTURESENTRY']._serialized_end=1211
-  _globals['_SWEEPNETWORK']._serialized_start=1274
-  _globals['_SWEEPNETWORK']._serialized_end=1738
-  _globals['_SWEEPNETWORK_TESTMAEBYCLASSENTRY']._serialized_start=1043
-  _globals['_SWEEPNETWORK_TESTMAEBYCLASSENTRY']._serialized_end=1096
-  _globals['_SWEEPBUDGET']._serialized_start=1741
-  _globals['_SWEEPBUDGET']._serialized_end=1884
+  _globals['_TRAININGRESULT']._serialized_end=1423
+  _globals['_TRAININGRESULT_BASELINEMAEENTRY']._serialized_start=1081
+  _globals['_TRAININGRESULT_BASELINEMAEENTRY']._serialized_end=1131
+  _globals['_TRAININGRESULT_TESTMAEBYCLASSENTRY']._serialized_start=1133
+  _globals['_TRAININGRESULT_TESTMAEBYCLASSENTRY']._serialized_end=1186
+  _globals['_TRAININGRESULT_TESTCOUNTBYCLASSENTRY']._serialized_start=1188
+  _globals['_TRAININGRESULT_TESTCOUNTBYCLASSENTRY']._serialized_end=1243
+  _globals['_TRAININGRESULT_BASELINEMAEASPROPOSEDENTRY']._serialized_start=1245
+  _globals['_TRAININGRESULT_BASELINEMAEASPROPOSEDENTRY']._serialized_end=1305
+  _globals['_TRAININGRESULT_TESTMAEBYPICTURESENTRY']._serialized_start=1307
+  _globals['_TRAININGRESULT_TESTMAEBYPICTURESENTRY']._serialized_end=1363
+  _globals['_SWEEPNETWORK']._serialized_start=1426
+  _globals['_SWEEPNETWORK']._serialized_end=1890
+  _globals['_SWEEPNETWORK_TESTMAEBYCLASSENTRY']._serialized_start=1133
+  _globals['_SWEEPNETWORK_TESTMAEBYCLASSENTRY']._serialized_end=1186
+  _globals['_SWEEPBUDGET']._serialized_start=1893
+  _globals['_SWEEPBUDGET']._serialized_end=2036
 # @@protoc_insertion_point(module_scope)

@@ -1,0 +1,75 @@
+"""`make folds` keeps what it has tested: what was stopped goes on at the next fold."""
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import stages.folds
+from pipeline.config import RunConfig
+from pipeline.config.judged import folds_config, holdout_config
+from pipeline.execution import RunFolder
+from pipeline.network.by_object import ObjectError
+from pipeline.network.folds import TestedFold
+from stages.folds import TESTED, fold_folder, measure, read_kept
+
+
+def fold_found(fold: int) -> TestedFold:
+    q = np.array([0.25, 0.75], dtype=np.float32)
+    error = ObjectError(f"mesh{fold}", 2, 0.5, 0.1 * fold, 0.1, None)
+    facts = {"train": 4, "val": 2, "test": 2, "best_epoch": 1, "val_mae": 0.1, "mae_single": 0.1}
+    constant = {"median": 0.25}
+    facts_of: dict[str, Any] = facts | {"baselines": constant, "baselines_as_proposed": constant}
+    return TestedFold([error], q, q, q, facts_of)
+
+
+def test_a_fold_that_was_tested_is_not_trained_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = RunFolder(tmp_path / "small" / "folds")
+    for fold in range(3):
+        fold_folder(folder, fold).path.mkdir(parents=True)
+    folder.config.write_text("")
+    trained: list[int] = []
+    key = "first"
+
+    def train(_: RunConfig, parts: object, fold: int, *others: object) -> TestedFold:
+        trained.append(fold)
+        if len(trained) == 2:
+            raise KeyboardInterrupt
+        return fold_found(fold)
+
+    objects = {f"mesh{k}": (SimpleNamespace(family=f"family {k}"), "test") for k in range(3)}
+    monkeypatch.setattr(stages.folds, "labelled", lambda folder: ((), None))
+    monkeypatch.setattr(stages.folds, "read_objects", lambda path: objects)
+    monkeypatch.setattr(stages.folds, "train_and_test", train)
+    monkeypatch.setattr(stages.folds, "key_of", lambda folder, fold, folds: f"{key} {fold}")
+    with pytest.raises(KeyboardInterrupt):
+        measure("small", 3, tmp_path)
+    assert not folder.summary("folds").exists()
+    measure("small", 3, tmp_path)
+    assert trained == [0, 1, 1, 2]
+    first = folder.summary("folds").read_text()
+    measure("small", 3, tmp_path)
+    assert trained == [0, 1, 1, 2]
+    assert without_time(folder.summary("folds").read_text()) == without_time(first)
+    assert "median predictor 0.2500" in (folder.path / "folds.md").read_text()
+    assert read_kept(fold_folder(folder, 1), "another key") is None
+    assert (fold_folder(folder, 1).path / TESTED).is_file()
+
+
+def without_time(text: str) -> list[str]:
+    return [line for line in text.splitlines() if "wall_time_s" not in line]
+
+
+def test_files_beside_the_runs_own_run_toml_are_found_from_within() -> None:
+    config = RunConfig.model_validate(
+        {"objects": {"masses": "masses.toml"}, "split": {"families": "../paper/families.toml"}}
+    )
+    dealt = folds_config(config, folds=5)
+    assert dealt.objects.masses == "../masses.toml"
+    assert dealt.split.families == "../../paper/families.toml"
+    # The meshes of a holdout are others.
+    assert holdout_config(config).objects.masses == ""
