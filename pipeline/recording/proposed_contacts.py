@@ -49,8 +49,8 @@ def errors_markdown(analysis: Mapping[str, Any]) -> str:
         rows += [_row(f"{title}{name}", group) for name, group in analysis[key].items()]
     return (
         "### Where predictions err\n\nMean &#124;q-hat - q&#124; over contacts that a policy would "
-        "propose in clutters of unseen families, one prediction each; the network without the "
-        "sensors' noise is the floor; objects by falling error.\n\n"
+        "propose in clutters of unseen families, one prediction each; beside the network itself on "
+        "the same contacts seen without the sensors' noise; objects by falling error.\n\n"
         f"| contacts | number | mean q | {' | '.join(names)} |\n"
         f"|-|-|-|{'-|' * len(names)}\n" + "\n".join(rows) + "\n"
     )
