@@ -99,7 +99,13 @@ CHANNELS = (
         "/grasps",
         ("softgrip.v1.GraspBatch", "softgrip.v1.RankedGrasps"),
         "Grasps: labelled ones of a scene and viewpoint, or ranked ones of a real picture",
-        f"{SI}; q, p and GW dimensionless; clouds in units of r_G; world and contact frames",
+        f"{SI}; q, p and GW dimensionless; world frame",
+    ),
+    Channel(
+        "/clouds",
+        ("softgrip.v1.CloudBatch",),
+        "Clouds around the grasps, or samples, of the message with the same log time",
+        "units of r_G, contact frame",
     ),
     Channel(
         "/grasps/poses",
@@ -119,8 +125,8 @@ CHANNELS = (
     Channel(
         "/samples",
         ("softgrip.v1.SampleBatch",),
-        "Shuffled training samples: cloud under the pad and its quality",
-        "clouds in units of r_G, contact frame; q and p dimensionless",
+        "Shuffled training samples: label, object, level; their clouds are on /clouds",
+        "q and p dimensionless",
     ),
     Channel(
         "/epochs",

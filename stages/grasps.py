@@ -24,22 +24,22 @@ from pipeline.execution import (
     run_in_order,
     stage_command,
 )
+from pipeline.execution.items import GRASP_COUNTS, item_key, items_basis
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.labelling.balancing import quality_histogram
 from pipeline.labelling.grasps import LabelledGrasps
 from pipeline.labelling.scene import label_scene, scene_surfaces
 from pipeline.labelling.shown_pads import SHOWN_SCENES, ShownPads, drape_again
-from pipeline.messages.grasps import grasp_batch, grasps_of, pads_message
+from pipeline.messages.grasps import PADS_TOPIC, pads_message, read_grasps, write_grasps
 from pipeline.messages.objects import read_objects
 from pipeline.messages.scenes import read_scene, scene_count
 from pipeline.recording.grasps import draw_grasps
 from pipeline.spread import choose_evenly
 from pipeline.stopwatch import Stopwatch
 from pipeline.world.raycasting import RayScene
-from schemas.softgrip.v1.grasps_pb2 import GraspBatch
 from stages.graph import GRASPS, inputs_of
 
-TOPIC, PADS_TOPIC = "/grasps", "/pads"
+GRASPS_OF = ("seed", "gripper", "sensing", "grasps")  # what the grasps of every scene rest on
 
 
 @dataclass(frozen=True)
@@ -54,6 +54,7 @@ class ShardJob:
     scenes: Path
     config: RunConfig
     provenance: Provenance
+    basis: str
 
 
 @dataclass(frozen=True)
@@ -74,6 +75,7 @@ def build(stage: StageContext) -> Summary:
     count = scene_count(scenes)
     share, more = divmod(stage.config.grasps.count, count)
     recorded = choose_evenly(count, SHOWN_SCENES)
+    basis = items_basis(stage.key, stage.config, GRASPS_OF, GRASP_COUNTS)
     pads = max(1, stage.config.recording.grasps // len(recorded))
     jobs = [
         ShardJob(
@@ -85,6 +87,7 @@ def build(stage: StageContext) -> Summary:
             scenes=scenes,
             config=stage.config,
             provenance=stage.provenance(),
+            basis=basis,
         )
         for index in range(count)
     ]
@@ -106,14 +109,10 @@ def synthesize_shard(job: ShardJob) -> ShardResult:
         rng = generator(job.config.seed, "grasps", scene.scene_id)
         surfaces = scene_surfaces(scene, meshes, job.config.scenes.table_side_m)
         batches = label_scene(scene, surfaces, job.config, job.grasps, rng)
-        size = job.config.grasps.samples_per_message
+        size, rounded = job.config.grasps.samples_per_message, job.config.sensing.rounded
+        key = item_key(job.basis, scene=scene.key, grasps=job.grasps)
         with ArtifactWriter(job.shard, job.provenance) as artifact:
-            written = 0
-            for origin, grasps in batches:
-                for start in range(0, len(grasps), size):
-                    part = grasps.rows(start, min(start + size, len(grasps)))
-                    artifact.write(TOPIC, grasp_batch(origin, part), log_time_ns=written)
-                    written += len(part)
+            written = write_grasps(artifact, batches, size, rounded, key)
             if job.pads:
                 with draping.running():
                     labelled = [grasps for _, grasps in batches]
@@ -142,8 +141,7 @@ def examined(shard: Path) -> ShardResult:
     quality, names, split = [], set(), ""
     status: Counter[str] = Counter()
     with open_artifact(shard) as artifact:
-        for _, message in artifact.messages(GraspBatch):
-            origin, grasps = grasps_of(message)
+        for origin, grasps in read_grasps(artifact, clouds=False):
             split = origin.split
             quality.append(grasps.quality)
             names |= {origin.object_names[i] for i in np.unique(grasps.object_index)}

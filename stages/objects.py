@@ -20,6 +20,7 @@ from pipeline.execution import (
     progress,
     stage_command,
 )
+from pipeline.execution.items import with_object_keys
 from pipeline.geometry.catalogue import CatalogueObject, MeasuredObject
 from pipeline.geometry.families import DeclaredFamily, read_declared
 from pipeline.geometry.intake import (
@@ -168,8 +169,9 @@ def publish(
     left_out: LeftOut,
 ) -> None:
     """Write the artifact."""
+    keyed = with_object_keys(objects, stage.key, stage.config)
     with ArtifactWriter(stage.output, stage.provenance(left_out.cut_short)) as artifact:
-        for index, item in enumerate(objects):
+        for index, item in enumerate(keyed):
             artifact.write(TOPIC, object_message(item, split[item.name]), log_time_ns=index)
         for index, message in enumerate(left_out.refused):
             artifact.write(REFUSED_TOPIC, message, log_time_ns=index)

@@ -5,6 +5,7 @@ from collections import Counter, deque
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,7 @@ from pipeline.execution import (
     stage_command,
 )
 from pipeline.execution.busy import BusyClock
+from pipeline.execution.items import scenes_basis, with_scene_key
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.messages.objects import read_objects
 from pipeline.messages.scenes import read_scene, write_scene
@@ -51,6 +53,7 @@ class SceneJob:
     objects: Path
     config: RunConfig
     provenance: Provenance
+    basis: str
 
     @property
     def seed(self) -> int:
@@ -111,15 +114,14 @@ def make_scenes(
 
 def scene_jobs(stage: StageContext) -> list[SceneJob]:
     """Every clutter of the run, level by level."""
-    counts = stage.config.scenes.clutters_per_level
-    shared = (stage.upstream("objects"), stage.config, stage.provenance())
+    counts, basis = stage.config.scenes.clutters_per_level, scenes_basis(stage.key, stage.config)
+    shared = (stage.upstream("objects"), stage.config, stage.provenance(), basis)
     jobs = []
-    for level in sorted(stage.config.scenes.levels):
-        for split in stage.config.scenes.splits:
-            for number in range(getattr(counts, split)):
-                scene_id = f"level{level}-{split}-{number:02d}"
-                path = stage.folder.state("scenes") / f"{scene_id}.mcap"
-                jobs.append(SceneJob(scene_id, level, split, path, *shared))
+    for level, split in product(sorted(stage.config.scenes.levels), stage.config.scenes.splits):
+        for number in range(getattr(counts, split)):
+            scene_id = f"level{level}-{split}-{number:02d}"
+            path = stage.folder.state("scenes") / f"{scene_id}.mcap"
+            jobs.append(SceneJob(scene_id, level, split, path, *shared))
     return jobs
 
 
@@ -143,17 +145,15 @@ def built_clutter(job: SceneJob) -> ClutterScene:
             "Add meshes, raise objects.limit, or leave the level out of scenes.levels",
         )
     seed = derive_seed(job.seed, "scene", job.scene_id)
-    return build_clutter(job.scene_id, job.level, job.split, pool, job.config.scenes, seed)
+    scene = build_clutter(job.scene_id, job.level, job.split, pool, job.config.scenes, seed)
+    return with_scene_key(scene, job.basis, pool)
 
 
 def pool_of(job: SceneJob) -> list[CatalogueObject]:
     """The objects of its split and its level's class."""
-    shape_class, _ = level_of(job.level)
-    return [
-        item
-        for item, split in catalogue(job.objects).values()
-        if split == job.split and item.shape_class == shape_class
-    ]
+    wanted, _ = level_of(job.level)
+    every = catalogue(job.objects).values()
+    return [item for item, of in every if of == job.split and item.shape_class == wanted]
 
 
 def render(job: SceneJob, scene: ClutterScene, clock: BusyClock) -> ClutterScene:

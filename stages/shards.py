@@ -17,14 +17,13 @@ from pipeline.clutter.levels import level_of
 from pipeline.errors import ArtifactError
 from pipeline.execution import StageContext, Summary, generator, progress, stage_command
 from pipeline.labelling.balancing import proposal_weights, quality_histogram
-from pipeline.messages.grasps import grasps_of
-from pipeline.messages.samples import sample_batch
+from pipeline.labelling.grasps import GraspOrigin, LabelledGrasps
+from pipeline.messages.grasps import read_grasps
+from pipeline.messages.samples import write_samples
 from pipeline.network.samples import SPLITS, Samples, join_samples
 from pipeline.recording.shards import draw_shards
-from schemas.softgrip.v1.grasps_pb2 import GraspBatch, ShardEntry
+from schemas.softgrip.v1.grasps_pb2 import ShardEntry
 from stages.graph import SHARDS, inputs_of
-
-TOPIC = "/samples"
 
 
 def build(stage: StageContext) -> Summary:
@@ -53,19 +52,17 @@ def gather(grasps: Path) -> tuple[tuple[str, ...], dict[str, Samples]]:
     shards = listed_shards(grasps)
     for shard in progress(shards, len(shards), "shards: reading grasps", "shard"):
         with open_artifact(shard) as artifact:
-            for _, message in artifact.messages(GraspBatch):
-                split, samples = as_samples(message, names)
-                parts.setdefault(split, []).append(samples)
-    return tuple(names), {split: join_samples(found) for split, found in parts.items()}
+            for origin, found in read_grasps(artifact):
+                parts.setdefault(origin.split, []).append(as_samples(origin, found, names))
+    return tuple(names), {split: join_samples(every) for split, every in parts.items()}
 
 
-def as_samples(message: GraspBatch, names: dict[str, int]) -> tuple[str, Samples]:
+def as_samples(origin: GraspOrigin, grasps: LabelledGrasps, names: dict[str, int]) -> Samples:
     """The part of a batch that training reads; new objects are added to ``names``."""
-    origin, grasps = grasps_of(message)
     index = np.array([names.setdefault(name, len(names)) for name in origin.object_names])
     count = len(grasps)
     shape_class = list(type(level_of(origin.level)[0])).index(level_of(origin.level)[0])
-    return origin.split, Samples(
+    return Samples(
         cloud=grasps.cloud,
         cloud_mask=grasps.cloud_mask,
         quality=grasps.quality.astype(np.float32),
@@ -102,9 +99,7 @@ def write_shard(
     """One shard: some hundreds of samples a message, log time is the sample's index."""
     config = stage.config.shards
     with ArtifactWriter(path, stage.provenance(), config.compression) as artifact:
-        for start in range(0, len(samples), config.samples_per_message):
-            part = samples.take(slice(start, start + config.samples_per_message))
-            artifact.write(TOPIC, sample_batch(part, names), log_time_ns=first + start)
+        write_samples(artifact, samples, names, config.samples_per_message, first)
 
 
 def summary(

@@ -9,7 +9,9 @@ from typing import Self
 from pipeline.errors import ArtifactError
 
 METADATA_NAME = "provenance"
-SCHEMA_VERSION = "softgrip.v1"
+# The part after the dot rises where earlier programs cannot follow: since 1.1 clouds lie apart.
+SCHEMA_VERSION = "softgrip.v1.1"
+READ_VERSIONS = ("softgrip.v1", SCHEMA_VERSION)
 DIGEST = "record_sha256"  # MCAP has no checksum of a metadata record
 
 
@@ -43,7 +45,7 @@ class Provenance:
     package_version
         Version of softgrip.
     schema_version
-        Major version of the message schemas.
+        Version of the message schemas that wrote the file.
     key_parts
         What ``key`` is computed over, as JSON; empty in files that do not record it.
     """
@@ -91,9 +93,10 @@ class Provenance:
             Fields are missing or damaged, or another major schema version wrote it.
         """
         written = metadata.get("schema_version", "none")
-        if written != SCHEMA_VERSION:
+        if written not in READ_VERSIONS:
             raise ArtifactError(
-                f"Written with schema version {written}, this softgrip reads {SCHEMA_VERSION}",
+                f"Written with schema version {written}, this softgrip reads "
+                f"{' and '.join(READ_VERSIONS)}",
                 "Use the softgrip version that wrote it, or make the file again",
             )
         # Early files have none, and a flipped bit that hides it leaves the other fields whole.
@@ -112,6 +115,7 @@ class Provenance:
                 seed=int(metadata["seed"]),
                 inputs=inputs,
                 package_version=metadata["package_version"],
+                schema_version=written,
                 key_parts=metadata.get("key_parts", ""),
             )
             _ = made.machine  # it can be read

@@ -87,7 +87,7 @@ class Artifact:
         if not topics:
             return
         with _named(self.path):
-            self._check_chunks(at_ns)
+            self._check_chunks(set(topics), at_ns)
             for schema, channel, message in self._reader.iter_messages(
                 topics=topics,
                 starting_at=at_ns,
@@ -148,11 +148,13 @@ class Artifact:
         with _named(self.path):
             check_data(self._file)
 
-    def _check_chunks(self, at_ns: int | None) -> None:
+    def _check_chunks(self, topics: set[str], at_ns: int | None) -> None:
         """Refuse chunks that declare what must not be allocated, before they are read."""
+        channels = {number for number, ch in self._summary.channels.items() if ch.topic in topics}
         for index in self._summary.chunk_indexes:
-            start = index.chunk_start_offset
+            start, held = index.chunk_start_offset, index.message_index_offsets
             wanted = at_ns is None or index.message_start_time <= at_ns <= index.message_end_time
+            wanted = wanted and (not held or not channels.isdisjoint(held))
             if wanted and start not in self._checked_chunks:
                 check_chunk(self._file, index)
                 self._checked_chunks.add(start)

@@ -121,6 +121,10 @@ class ArtifactWriter:
             data=data,
         )
 
+    def end_chunk(self) -> None:
+        """What is written next lies in another chunk: who reads the one does not read the other."""
+        self._writer.flush()
+
     def attach(self, name: str, media_type: str, data: bytes) -> None:
         """Add a named file, such as a checkpoint."""
         self._writer.add_attachment(

@@ -11,7 +11,7 @@ from jaxtyping import Float, Int
 
 from pipeline.artifacts import ArtifactWriter
 from pipeline.benchmarks.clock import Laps, quantiles_ms
-from pipeline.benchmarks.storage import PROVENANCE
+from pipeline.benchmarks.storage import BATCH, PROVENANCE
 from pipeline.config import RunConfig
 from pipeline.config.grasps import GripperConfig
 from pipeline.geometry.mesh import Mesh
@@ -25,7 +25,7 @@ from pipeline.labelling.grasps import GraspOrigin, LabelledGrasps
 from pipeline.labelling.heights import pad_heights
 from pipeline.labelling.poses import ROUND, label_poses
 from pipeline.labelling.sampling import Candidates, contact_frames
-from pipeline.messages.grasps import grasp_batch
+from pipeline.messages.grasps import write_grasps
 from pipeline.sensing.depth_noise import disturb
 from pipeline.sensing.sub_cloud import sub_clouds
 from pipeline.world.raycasting import RayScene
@@ -60,7 +60,7 @@ def end_to_end(
     started, kept = time.perf_counter(), 0
     with tempfile.TemporaryDirectory() as scratch:
         for index, scene in enumerate(scenes):
-            kept += write_grasps(Path(scratch) / f"{index}.mcap", label(scene))
+            kept += write_shard(Path(scratch) / f"{index}.mcap", label(scene))
     seconds = time.perf_counter() - started
     return {
         "grasps_per_s_per_core": round(labelled / seconds),
@@ -68,12 +68,10 @@ def end_to_end(
     }
 
 
-def write_grasps(path: Path, batches: Labelled) -> int:
+def write_shard(path: Path, batches: Labelled) -> int:
     """A shard as stage grasps writes it; how many grasps."""
     with ArtifactWriter(path, PROVENANCE) as artifact:
-        for origin, grasps in batches:
-            artifact.write("/grasps", grasp_batch(origin, grasps), log_time_ns=0)
-    return sum(len(grasps) for _, grasps in batches)
+        return write_grasps(artifact, batches, BATCH, rounded=True)
 
 
 def phases(
@@ -116,7 +114,7 @@ def phases(
     per_grasp["sub cloud"] = 1e6 * laps.seconds["sub cloud"] / len(frames)
     with tempfile.TemporaryDirectory() as scratch:
         laps.start()
-        count = write_grasps(Path(scratch) / "x.mcap", written)
+        count = write_shard(Path(scratch) / "x.mcap", written)
         laps.lap("writing")
     per_grasp["writing"] = 1e6 * laps.seconds["writing"] / count
     some = slice(0, LATENCY_GRASPS)

@@ -16,9 +16,9 @@ import zarr
 from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact
 from pipeline.benchmarks.clock import seconds_of
 from pipeline.labelling.grasps import LabelledGrasps
-from pipeline.messages.samples import STORED_AS, sample_batch, samples_of
+from pipeline.messages.clouds import cloud_batch, clouds_of
+from pipeline.messages.samples import STORED_AS, read_samples, write_samples
 from pipeline.network.samples import Samples
-from schemas.softgrip.v1.samples_pb2 import SampleBatch
 
 BATCH = 256  # samples a message, as grasps.samples_per_message
 REPEATS = 5  # enough for a median, in seconds
@@ -72,11 +72,11 @@ def against_peers(samples: Samples, folder: Path) -> dict[str, dict[str, float]]
 
 def samples_of_grasps(grasps: Sequence[LabelledGrasps]) -> Samples:
     """Labelled grasps as training samples; columns that do not affect storage are constants."""
-    cloud = np.concatenate([part.cloud for part in grasps])
-    count = len(cloud)
+    clouds = [clouds_of(cloud_batch(part.cloud, part.cloud_mask, rounded=True)) for part in grasps]
+    count = sum(len(part) for part in grasps)
     return Samples(
-        cloud=cloud,
-        cloud_mask=np.concatenate([part.cloud_mask for part in grasps]),
+        cloud=np.concatenate([cloud for cloud, _ in clouds]),
+        cloud_mask=np.concatenate([mask for _, mask in clouds]),
         quality=np.concatenate([part.quality for part in grasps]),
         object_index=np.zeros(count, dtype=np.int64),
         shape_class=np.zeros(count, dtype=np.int64),
@@ -105,14 +105,14 @@ def write_mcap(path: Path, parts: list[Samples]) -> None:
     """Write MCAP as the shards stage does."""
     with ArtifactWriter(path, PROVENANCE, "none") as artifact:
         for index, part in enumerate(parts):
-            artifact.write("/samples", sample_batch(part, ()), log_time_ns=index)
+            write_samples(artifact, part, (), size=len(part), first=index)
 
 
 def read_mcap(path: Path) -> Iterator[dict[str, np.ndarray]]:
     """Read MCAP as training does."""
     with open_artifact(path) as artifact:
-        for _, message in artifact.messages(SampleBatch):
-            yield _stored(samples_of(message))
+        for samples in read_samples(artifact):
+            yield _stored(samples)
 
 
 def write_hdf5(path: Path, parts: list[Samples]) -> None:

@@ -145,6 +145,10 @@ class SensingConfig(ScaledSection):
     grid_height_rg: float = Field(
         6.0, gt=0, description="points farther than this above the contact are left out [r_G]"
     )
+    rounded: bool = Field(
+        True,
+        description="clouds are kept in steps of r_G / 1024, at half the size; false: half floats",
+    )
     layer_rg: float = Field(
         0.2, gt=0, description="a cell holds the mean of its points this near its highest [r_G]"
     )

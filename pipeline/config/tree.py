@@ -192,7 +192,9 @@ def load_run_config(path: Path) -> RunConfig:
         raise _explained(path, error) from error
 
 
-def section_digest(config: RunConfig, sections: tuple[str, ...]) -> str:
+def section_digest(
+    config: RunConfig, sections: tuple[str, ...], besides: tuple[str, ...] = ()
+) -> str:
     """SHA-256 over the values of some sections, derived ones included, whatever the file's layout.
 
     Parameters
@@ -201,12 +203,17 @@ def section_digest(config: RunConfig, sections: tuple[str, ...]) -> str:
         The tree of a run.
     sections
         Names such as ``"grasps"`` or, for one field of a section, ``"recording.grasps"``.
+    besides
+        Fields of these sections that do not count, such as ``"grasps.count"``.
 
     Returns
     -------
     The digest, as 64 hexadecimal digits.
     """
     values = {name: _plain(operator.attrgetter(name)(config)) for name in sections}
+    for left_out in besides:
+        name, _, field = left_out.rpartition(".")
+        del values[name][field]
     return hashlib.sha256(json.dumps(values, sort_keys=True).encode()).hexdigest()
 
 

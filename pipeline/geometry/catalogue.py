@@ -108,6 +108,8 @@ class CatalogueObject:
     """Objects of one family are alike, and all in one split."""
     copies: tuple[str, ...] = ()
     """Further files of the same surface, left out."""
+    key: str = ""
+    """Digest of what shape, size, mass and appearance rest on; empty where it is not told."""
 
     @property
     def content(self) -> str:

@@ -12,11 +12,11 @@ from pipeline.interchange.object_grasps import (
     placed_grasps,
     split_by_body,
 )
-from pipeline.messages.grasps import grasps_of
+from pipeline.messages.clouds import with_clouds
+from pipeline.messages.grasps import read_grasps
 from pipeline.messages.objects import read_objects
 from pipeline.messages.samples import samples_of
 from pipeline.network.samples import Samples, join_samples
-from schemas.softgrip.v1.grasps_pb2 import GraspBatch
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 from schemas.softgrip.v1.scenes_pb2 import Scene
 
@@ -52,8 +52,8 @@ def grasps_by_object(objects: Path, scenes: Path, grasps: Path) -> list[ObjectGr
     parts: dict[str, list[ObjectGrasps]] = {}
     for shard in listed_shards(grasps):
         with open_artifact(shard) as artifact:
-            for _, message in artifact.messages(GraspBatch):
-                for part in split_by_body(*grasps_of(message), catalogue, poses):
+            for origin, found in read_grasps(artifact, clouds=False):
+                for part in split_by_body(origin, found, catalogue, poses):
                     parts.setdefault(part.item.name, []).append(part)
     return [join_grasps(parts[name]) for name in catalogue if name in parts]
 
@@ -78,8 +78,7 @@ def grasps_by_scene(grasps: Path) -> dict[str, PlacedGrasps]:
     parts: dict[str, list[PlacedGrasps]] = {}
     for shard in listed_shards(grasps):
         with open_artifact(shard) as artifact:
-            for _, message in artifact.messages(GraspBatch):
-                origin, found = grasps_of(message)
+            for origin, found in read_grasps(artifact, clouds=False):
                 parts.setdefault(origin.scene_id, []).append(placed_grasps(found))
     return {scene: join_placed(found) for scene, found in parts.items()}
 
@@ -87,5 +86,6 @@ def grasps_by_scene(grasps: Path) -> dict[str, PlacedGrasps]:
 def read_shard(shard: Path) -> tuple[Samples, tuple[str, ...]]:
     """All samples of a shard, and the names that their ``object_index`` points into."""
     with open_artifact(shard) as artifact:
-        messages = [message for _, message in artifact.messages(SampleBatch)]
-    return join_samples([samples_of(m) for m in messages]), tuple(messages[0].object_names)
+        messages = list(with_clouds(artifact, SampleBatch))
+    samples = join_samples([samples_of(rows, clouds) for rows, clouds in messages])
+    return samples, tuple(messages[0][0].object_names)

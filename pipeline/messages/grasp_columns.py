@@ -8,8 +8,7 @@ from jaxtyping import Bool, Float, Int, Shaped
 
 from pipeline.artifacts.reading import open_artifact
 from pipeline.artifacts.sharding import listed_shards
-from pipeline.messages.grasps import grasps_of
-from schemas.softgrip.v1.grasps_pb2 import GraspBatch
+from pipeline.messages.grasps import read_grasps
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,8 +46,7 @@ def read_columns(index: Path) -> GraspColumns:
     parts: list[tuple[np.ndarray, ...]] = []
     for scene, shard in enumerate(listed_shards(index)):
         with open_artifact(shard) as artifact:
-            for _, message in artifact.messages(GraspBatch):
-                origin, grasps = grasps_of(message)
+            for origin, grasps in read_grasps(artifact):
                 parts.append(
                     (
                         np.full(len(grasps), scene),

@@ -1,11 +1,17 @@
-"""Labelled grasps ↔ softgrip.v1.GraspBatch, pads to look at ↔ softgrip.v1.DrapedPads."""
+"""Labelled grasps ↔ softgrip.v1.GraspBatch and CloudBatch, shown pads ↔ softgrip.v1.DrapedPads."""
+
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from pipeline.artifacts.reading import Artifact
 from pipeline.artifacts.tensors import set_tensors, tensors_of
+from pipeline.artifacts.writing import ArtifactWriter
 from pipeline.errors import ContentError
 from pipeline.labelling.grasps import GraspOrigin, LabelledGrasps
 from pipeline.labelling.shown_pads import ShownPads
+from pipeline.messages.clouds import cloud_batch, clouds_beside, with_clouds, write_apart
+from schemas.softgrip.v1.clouds_pb2 import CloudBatch
 from schemas.softgrip.v1.grasps_pb2 import DrapedPads, GraspBatch
 
 # What each array is stored as; the field names are those of the message.
@@ -24,8 +30,6 @@ STORED_AS = {
     "tilt_rad": "f4",
     "proposal": "u1",
     "keep_probability": "f4",
-    "cloud": "f2",
-    "cloud_mask": "u1",
     "touch_height_m": "f8",
     "pictures": "u1",
 }
@@ -36,8 +40,6 @@ SHAPES = {
     "limit_slack": "n k",
     "weight_summary": "n 3",
     "contact_mask": "n v",
-    "cloud": "n g g 3",
-    "cloud_mask": "n g g",
 }
 # What the fields hold that v1 did not have from the start.
 UNLESS_THERE = {"pictures": 1}
@@ -47,9 +49,76 @@ PADS_STORED_AS = {"grasp": "u4", "height_m": "f4", "pressure": "f4"}
 PADS_SHAPES = {"grasp": "k", "height_m": "k v", "pressure": "k t"}
 
 
-def grasp_batch(origin: GraspOrigin, grasps: LabelledGrasps) -> GraspBatch:
-    """The message of some grasps."""
+TOPIC, PADS_TOPIC = "/grasps", "/pads"
+
+
+def write_grasps(
+    artifact: ArtifactWriter,
+    batches: Sequence[tuple[GraspOrigin, LabelledGrasps]],
+    size: int,
+    rounded: bool,
+    key: str = "",
+) -> int:
+    """Write the grasps of a scene, and apart from them their clouds.
+
+    Parameters
+    ----------
+    artifact
+        The shard.
+    batches
+        The grasps by viewpoint.
+    size
+        Most grasps in a message.
+    rounded
+        Whether clouds may be rounded to steps.
+    key
+        Digest of what the grasps rest on.
+
+    Returns
+    -------
+    How many grasps were written.
+    """
+    parts, written = [], 0
+    for origin, grasps in batches:
+        for start in range(0, len(grasps), size):
+            part = grasps.rows(start, min(start + size, len(grasps)))
+            parts.append((written, origin, part))
+            written += len(part)
+    rows = ((at, grasp_batch(origin, part, key)) for at, origin, part in parts)
+    clouds = ((at, cloud_batch(part.cloud, part.cloud_mask, rounded)) for at, _, part in parts)
+    write_apart(artifact, TOPIC, rows, clouds)
+    return written
+
+
+def read_grasps(
+    artifact: Artifact, clouds: bool = True
+) -> Iterator[tuple[GraspOrigin, LabelledGrasps]]:
+    """The grasps of a shard, message by message.
+
+    Parameters
+    ----------
+    artifact
+        A shard of stage grasps, of any version.
+    clouds
+        Whether clouds are read; if not, they have no cells.
+
+    Yields
+    ------
+    tuple[GraspOrigin, LabelledGrasps]
+        Where the grasps are from, and the grasps.
+    """
+    if clouds:
+        for message, batch in with_clouds(artifact, GraspBatch):
+            yield grasps_of(message, batch)
+    else:
+        for _, message in artifact.messages(GraspBatch):
+            yield grasps_of(message)
+
+
+def grasp_batch(origin: GraspOrigin, grasps: LabelledGrasps, key: str = "") -> GraspBatch:
+    """The message of some grasps, their clouds left out."""
     message = GraspBatch(
+        key=key,
         scene_id=origin.scene_id,
         viewpoint=origin.viewpoint,
         level=origin.level,
@@ -65,13 +134,17 @@ def grasp_batch(origin: GraspOrigin, grasps: LabelledGrasps) -> GraspBatch:
     return message
 
 
-def grasps_of(message: GraspBatch) -> tuple[GraspOrigin, LabelledGrasps]:
+def grasps_of(
+    message: GraspBatch, clouds: CloudBatch | None = None
+) -> tuple[GraspOrigin, LabelledGrasps]:
     """The grasps of a message: views of its bytes wherever possible.
 
     Parameters
     ----------
     message
         Of a shard of stage grasps.
+    clouds
+        The message of their clouds; without it clouds that lie apart have no cells.
 
     Returns
     -------
@@ -90,7 +163,8 @@ def grasps_of(message: GraspBatch) -> tuple[GraspOrigin, LabelledGrasps]:
     arrays["contact_mask"] = np.unpackbits(
         arrays["contact_mask"], axis=1, count=message.pad_vertices
     ).view(bool)
-    arrays["cloud_mask"] = arrays["cloud_mask"].view(bool)
+    rows = len(arrays["quality"])
+    arrays["cloud"], arrays["cloud_mask"] = clouds_beside(message, clouds, rows)
     origin = GraspOrigin(
         scene_id=message.scene_id,
         viewpoint=message.viewpoint,

@@ -29,6 +29,7 @@ def refused_message(label: str, error: MeshError) -> objects_pb2.RefusedMesh:
 def object_message(item: CatalogueObject, split: str) -> objects_pb2.CatalogueObject:
     """The message of one object."""
     return objects_pb2.CatalogueObject(
+        key=item.key,
         name=item.name,
         split=split,
         source=item.source,
@@ -102,6 +103,7 @@ def object_of(message: objects_pb2.CatalogueObject) -> CatalogueObject:
         material=cast(Material, message.material),
         family=message.family,
         copies=tuple(message.copies),
+        key=message.key,
     )
 
 

@@ -19,10 +19,9 @@ from pipeline.artifacts.publishing import file_sha256, scratch_beside, write_err
 from pipeline.artifacts.reading import open_artifact
 from pipeline.artifacts.sharding import listed_shards, read_index
 from pipeline.errors import ArtifactError
-from pipeline.messages.samples import STORED_AS, samples_of
+from pipeline.messages.samples import STORED_AS, read_samples
 from pipeline.network.samples import Samples
 from schemas.softgrip.v1.grasps_pb2 import ShardEntry
-from schemas.softgrip.v1.samples_pb2 import SampleBatch
 
 # Rises whenever the files of a cache change: one of another version is made again.
 CACHE_VERSION = 2
@@ -144,5 +143,4 @@ def _parts(shards: dict[Path, ShardEntry]) -> Iterator[Samples]:
                 "Delete it and run 'make shards' again",
             )
         with open_artifact(path) as artifact:
-            for _, message in artifact.messages(SampleBatch):
-                yield samples_of(message)
+            yield from read_samples(artifact)

@@ -1,18 +1,26 @@
-"""Training samples ↔ softgrip.v1.SampleBatch."""
+"""Training samples ↔ softgrip.v1.SampleBatch and CloudBatch."""
 
 import math
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from pipeline.artifacts.reading import open_artifact
+from pipeline.artifacts.reading import Artifact, open_artifact
 from pipeline.artifacts.sharding import listed_shards
 from pipeline.artifacts.tensors import set_tensors, tensors_of
+from pipeline.artifacts.writing import ArtifactWriter
+from pipeline.messages.clouds import (
+    INLINE_STORED_AS,
+    cloud_batch,
+    clouds_beside,
+    with_clouds,
+    write_apart,
+)
 from pipeline.network.samples import Samples, join_samples
+from schemas.softgrip.v1.clouds_pb2 import CloudBatch
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 
-STORED_AS = {
-    "cloud": "f2",
-    "cloud_mask": "u1",
+TOPIC = "/samples"
+ROWS_STORED_AS = {
     "quality": "f4",
     "object_index": "u2",
     "shape_class": "u1",
@@ -21,30 +29,67 @@ STORED_AS = {
     "proposal_weight": "f4",
     "pictures": "u1",
 }
-SHAPES = {
-    "cloud": "n g g 3",
-    "cloud_mask": "n g g",
-    **dict.fromkeys(("quality", "object_index", "shape_class", "level", "pressure"), "n"),
-    **dict.fromkeys(("proposal_weight", "pictures"), "n"),
-}
+SHAPES = dict.fromkeys(ROWS_STORED_AS, "n")
+# What a sample's fields are once they are read, clouds included.
+STORED_AS = {**INLINE_STORED_AS, **ROWS_STORED_AS}
 # What the fields hold that v1 did not have from the start.
 UNLESS_THERE = {"proposal_weight": math.nan, "pictures": 1}
 
 
+def write_samples(
+    artifact: ArtifactWriter,
+    samples: Samples,
+    object_names: tuple[str, ...],
+    size: int,
+    first: int = 0,
+) -> None:
+    """Write samples, and apart from them their clouds.
+
+    Clouds lie in steps where that loses nothing, as it does where stage grasps rounded them.
+
+    Parameters
+    ----------
+    artifact
+        The shard.
+    samples
+        All its samples.
+    object_names
+        What their ``object_index`` points into.
+    size
+        Most samples in a message.
+    first
+        Number of the first sample in its split.
+    """
+    starts = range(0, len(samples), size)
+    parts = [samples.take(slice(start, start + size)) for start in starts]
+    rows = (sample_batch(part, object_names) for part in parts)
+    clouds = (cloud_batch(part.cloud, part.cloud_mask, rounded=False) for part in parts)
+    times = [first + start for start in starts]
+    write_apart(artifact, TOPIC, zip(times, rows, strict=True), zip(times, clouds, strict=True))
+
+
+def read_samples(artifact: Artifact) -> Iterator[Samples]:
+    """The samples of a shard of any version, message by message."""
+    for message, batch in with_clouds(artifact, SampleBatch):
+        yield samples_of(message, batch)
+
+
 def sample_batch(samples: Samples, object_names: tuple[str, ...]) -> SampleBatch:
-    """The message of some samples."""
+    """The message of some samples, their clouds left out."""
     message = SampleBatch(object_names=object_names)
-    set_tensors(message, vars(samples), STORED_AS)
+    set_tensors(message, vars(samples), ROWS_STORED_AS)
     return message
 
 
-def samples_of(message: SampleBatch) -> Samples:
-    """The samples of a message: views of its bytes.
+def samples_of(message: SampleBatch, clouds: CloudBatch | None = None) -> Samples:
+    """The samples of a message: views of its bytes wherever possible.
 
     Parameters
     ----------
     message
         Of a shard of stage shards.
+    clouds
+        The message of their clouds; without it clouds that lie apart have no cells.
 
     Returns
     -------
@@ -55,8 +100,9 @@ def samples_of(message: SampleBatch) -> Samples:
     ContentError
         a tensor is missing, or they do not fit together.
     """
-    arrays = tensors_of(message, STORED_AS, SHAPES, UNLESS_THERE)
-    arrays["cloud_mask"] = arrays["cloud_mask"].view(bool)
+    arrays = tensors_of(message, ROWS_STORED_AS, SHAPES, UNLESS_THERE)
+    rows = len(arrays["quality"])
+    arrays["cloud"], arrays["cloud_mask"] = clouds_beside(message, clouds, rows)
     return Samples(**arrays)
 
 
@@ -80,5 +126,4 @@ def read_split(index: Path, split: str) -> Samples:
 def _batches(shards: Iterable[Path]) -> Iterator[Samples]:
     for shard in shards:
         with open_artifact(shard) as artifact:
-            for _, message in artifact.messages(SampleBatch):
-                yield samples_of(message)
+            yield from read_samples(artifact)

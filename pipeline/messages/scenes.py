@@ -45,9 +45,11 @@ IMAGES = {
 
 
 def write_scene(artifact: ArtifactWriter, index: int, scene: ClutterScene, renderer: str) -> None:
-    """Append scene ``index`` and its images."""
+    """Append scene ``index`` and, in chunks of their own, its images."""
     time_ns = index * NS_PER_SCENE
+    artifact.end_chunk()
     artifact.write(TOPIC, scene_message(scene, renderer), time_ns)
+    artifact.end_chunk()
     artifact.write("/tf", frame_transforms(_poses(scene), time_ns), time_ns)
     for view in scene.views:
         topic = f"/scene/{view.camera.name}"
@@ -61,6 +63,7 @@ def scene_message(scene: ClutterScene, renderer: str) -> scenes_pb2.Scene:
     """The record of a scene, images left out."""
     shape_class, distribution = level_of(scene.level)
     return scenes_pb2.Scene(
+        key=scene.key,
         scene_id=scene.scene_id,
         level=scene.level,
         shape_class=shape_class,
@@ -146,6 +149,7 @@ def _scene(artifact: Artifact, message: scenes_pb2.Scene, time_ns: int) -> Clutt
         gaps_m=np.array([placed.gap_m for placed in message.objects]),
         contacts=tuple((int(a), int(b)) for a, b in contacts),
         settle_time_s=message.settle_time_s,
+        key=message.key,
         views=tuple(_view(artifact, viewpoint, time_ns) for viewpoint in message.viewpoints),
     )
 

@@ -22,7 +22,7 @@ from pipeline.gripper.pad import Pad
 from pipeline.labelling.grasps import GraspOrigin, LabelledGrasps
 from pipeline.labelling.poses import pad_of
 from pipeline.labelling.shown_pads import SHOWN_SCENES
-from pipeline.messages.grasps import grasps_of, pads_of
+from pipeline.messages.grasps import pads_of, read_grasps
 from pipeline.messages.objects import read_objects
 from pipeline.messages.scenes import read_placed
 from pipeline.recording import colours
@@ -38,7 +38,7 @@ from pipeline.recording.recording import (
 from pipeline.recording.shapes import shown_mesh, shown_pose
 from pipeline.spread import choose_evenly
 from pipeline.world.scene import PlacedObject
-from schemas.softgrip.v1.grasps_pb2 import DrapedPads, GraspBatch
+from schemas.softgrip.v1.grasps_pb2 import DrapedPads
 
 TIMELINE = "grasp"
 FULL_PRESSURE = 1.1  # p w_j of a full seal where w_j is greatest, with sigma_W of Eq. (13)
@@ -98,7 +98,7 @@ def draw_grasps(stage: FinishedStage, figures: Mapping[str, Any]) -> None:
 def shown_grasps(placed: tuple[PlacedObject, ...], shard: Path) -> list[ShownGrasp]:
     """The grasps of a shard that have their pads in it."""
     with open_artifact(shard) as artifact:
-        batches = [grasps_of(message) for _, message in artifact.messages(GraspBatch)]
+        batches = list(read_grasps(artifact))
         pads = pads_of(artifact.one(DrapedPads))
     rows = [(origin, batch, row) for origin, batch in batches for row in range(len(batch))]
     shown = []

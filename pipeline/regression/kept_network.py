@@ -10,16 +10,15 @@ import numpy as np
 from jaxtyping import Float
 
 from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact
-from pipeline.messages.samples import sample_batch, samples_of
+from pipeline.messages.samples import read_samples as read_batches
+from pipeline.messages.samples import write_samples as write_batches
 from pipeline.network.checkpoint import load_checkpoint_bytes
 from pipeline.network.control_inference import ControlPredictor
 from pipeline.network.export import export_onnx_bytes
 from pipeline.network.ga_cnn import GaCnn
 from pipeline.network.inference import predict
 from pipeline.network.samples import Samples, join_samples
-from schemas.softgrip.v1.samples_pb2 import SampleBatch
 
-TOPIC = "/samples"
 BATCH = 64  # samples predicted at a time
 
 
@@ -32,13 +31,13 @@ def write_samples(path: Path, provenance: Provenance, samples: Samples) -> None:
     """Keep some samples; the names of their objects do not matter here."""
     with ArtifactWriter(path, provenance) as artifact:
         names = tuple(f"object {number}" for number in range(int(samples.object_index.max()) + 1))
-        artifact.write(TOPIC, sample_batch(samples, names), log_time_ns=0)
+        write_batches(artifact, samples, names, size=len(samples))
 
 
 def read_samples(path: Path) -> Samples:
     """The kept samples."""
     with open_artifact(path) as artifact:
-        return join_samples([samples_of(artifact.one(SampleBatch))])  # a copy, not a view
+        return join_samples(list(read_batches(artifact)))  # a copy, not a view
 
 
 def spread_over_quality(samples: Samples, count: int) -> Samples:

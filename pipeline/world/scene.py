@@ -56,6 +56,8 @@ class ClutterScene:
         Simulated time until all objects were at rest [s].
     views
         Pictures of the cameras.
+    key
+        Digest of what the scene rests on; empty where it is not told.
     """
 
     scene_id: str
@@ -67,3 +69,4 @@ class ClutterScene:
     contacts: tuple[tuple[int, int], ...]
     settle_time_s: float
     views: tuple[CameraView, ...]
+    key: str = ""

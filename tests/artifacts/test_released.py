@@ -11,9 +11,9 @@ import pytest
 from pipeline.artifacts import from_tensor, open_artifact
 from pipeline.artifacts.inspection import verify_files
 from pipeline.artifacts.sharding import listed_shards, read_index
-from pipeline.messages.grasps import grasps_of
+from pipeline.messages.grasps import read_grasps
 from pipeline.messages.objects import read_objects
-from pipeline.messages.samples import samples_of
+from pipeline.messages.samples import read_samples
 from pipeline.messages.scenes import read_scenes
 from pipeline.messages.training import CHECKPOINT, EXPORT
 from pipeline.network.checkpoint import load_checkpoint_bytes
@@ -21,8 +21,6 @@ from pipeline.network.control_inference import ControlPredictor, check_export
 from pipeline.network.inference import predict
 from schemas.compatibility import read_released, versions
 from schemas.softgrip.v1.evaluation_pb2 import Attempt, LevelResult
-from schemas.softgrip.v1.grasps_pb2 import GraspBatch
-from schemas.softgrip.v1.samples_pb2 import SampleBatch
 from schemas.softgrip.v1.training_pb2 import Epoch, TrainingResult
 from tests.artifacts.readers import by_node, by_us
 
@@ -58,14 +56,12 @@ def test_grasps_and_samples(released: Path) -> None:
     quality, samples = [], 0
     for shard in listed_shards(released / "grasps.mcap"):
         with open_artifact(shard) as artifact:
-            for _, message in artifact.messages(GraspBatch):
-                origin, grasps = grasps_of(message)
+            for origin, grasps in read_grasps(artifact):
                 quality.append(grasps.quality)
                 assert set(np.unique(grasps.status)) <= set(range(len(origin.status_names)))
     for shard in listed_shards(released / "shards.mcap"):
         with open_artifact(shard) as artifact:
-            for _, batch in artifact.messages(SampleBatch):
-                found = samples_of(batch)
+            for found in read_samples(artifact):
                 samples += len(found)
                 # 0.1.0 cut each cloud from one picture and did not say how grasps were drawn.
                 if released.name.endswith("-0.1.0"):
@@ -88,7 +84,7 @@ def test_training(released: Path) -> None:
     assert network.config.layers == result.layers
     (shard, *_) = listed_shards(released / "shards.mcap", ["test"])
     with open_artifact(shard) as artifact:
-        samples = samples_of(next(m for _, m in artifact.messages(SampleBatch)))
+        samples = next(read_samples(artifact))
     # Checkpoint and export agree, and on the samples they were tested on they predict what their
     # run wrote down, which was a mean over the eight symmetries.
     cloud, mask = samples.cloud.copy(), samples.cloud_mask.copy()

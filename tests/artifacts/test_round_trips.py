@@ -21,6 +21,7 @@ from pipeline.artifacts.tensors import DTYPES
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.shape import ShapeClass
+from pipeline.messages.clouds import cloud_batch
 from pipeline.messages.objects import object_message, object_of, read_objects
 from pipeline.messages.samples import STORED_AS, sample_batch, samples_of
 from pipeline.messages.scenes import read_scene, write_scene
@@ -30,6 +31,7 @@ from pipeline.world.scene import ClutterScene, PlacedObject
 from pipeline.world.view import CameraView
 from schemas.compatibility import ROOT, versions
 from schemas.softgrip.v1 import objects_pb2, samples_pb2
+from schemas.softgrip.v1.clouds_pb2 import CloudBatch
 
 # One file a draw: a few draws a type are many in all.
 few = settings(
@@ -180,7 +182,9 @@ def test_samples_round_trip_in_any_number(seed: int, count: int, side: int) -> N
         pictures=rng.integers(1, 4, count),
     )
     wire = sample_batch(samples, ("a", "b")).SerializeToString()
-    same(samples_of(samples_pb2.SampleBatch.FromString(wire)), samples)
+    clouds = cloud_batch(samples.cloud, samples.cloud_mask, rounded=False).SerializeToString()
+    message, beside = samples_pb2.SampleBatch.FromString(wire), CloudBatch.FromString(clouds)
+    same(samples_of(message, beside), samples)
     assert set(STORED_AS) == {field.name for field in fields(Samples)}
 
 

@@ -20,11 +20,13 @@ from pipeline.artifacts import ArtifactWriter, Provenance, from_tensor, open_art
 from pipeline.artifacts.bounds import FOOTER, MAGIC
 from pipeline.artifacts.inspection import read_contents, verify_files
 from pipeline.config import ObjectsConfig, load_run_config
+from pipeline.config.grasps import CELL_SIDE
 from pipeline.errors import SoftgripError
 from pipeline.geometry.mesh_files import load_mesh_file
 from pipeline.geometry.mesh_folders import MESH_SUFFIXES
 from pipeline.geometry.urdf_files import load_object_file
 from pipeline.labelling.grasps import GraspOrigin, LabelledGrasps
+from pipeline.messages.clouds import cloud_batch, clouds_of
 from pipeline.messages.grasps import grasp_batch, grasps_of
 from pipeline.messages.objects import object_of
 from pipeline.messages.samples import sample_batch, samples_of
@@ -32,6 +34,7 @@ from pipeline.messages.training import CHECKPOINT, EXPORT
 from pipeline.network.checkpoint import _digest, load_checkpoint_bytes
 from pipeline.network.control_inference import ControlPredictor
 from pipeline.network.samples import Samples
+from schemas.softgrip.v1.clouds_pb2 import CloudBatch
 from schemas.softgrip.v1.grasps_pb2 import GraspBatch, ShardIndex
 from schemas.softgrip.v1.objects_pb2 import CatalogueObject
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
@@ -42,7 +45,10 @@ PROVENANCE = Provenance("objects", "k", "c", "d", 7, (), "0.1.0")
 LARGEST_SEED = 100_000  # bytes: what is larger is read too slowly to be tried often
 FEW_FACES = ObjectsConfig(max_faces=10_000)
 NOTE = "note.txt"
-MESSAGES: tuple[type[Message], ...] = (CatalogueObject, SampleBatch, GraspBatch, ShardIndex)
+MESSAGES: tuple[type[Message], ...] = (
+    *(CatalogueObject, SampleBatch, GraspBatch, ShardIndex),
+    CloudBatch,
+)
 
 
 def read_mesh(data: bytes) -> None:
@@ -91,6 +97,8 @@ def read_mcap(data: bytes) -> None:
                 samples_of(samples)
             for _, grasps in artifact.messages(GraspBatch):
                 grasps_of(grasps)
+            for _, clouds in artifact.messages(CloudBatch):
+                clouds_of(clouds)
             for _, index in artifact.messages(ShardIndex):
                 from_tensor(index.quality_histogram)
             if NOTE in artifact.attachment_sizes():
@@ -138,7 +146,7 @@ def mcap_seeds() -> Iterator[bytes]:
     item.mesh.faces.CopyFrom(to_tensor(np.array([[0, 1, 2]], dtype=np.uint32)))
     item.inertia_kg_m2.CopyFrom(to_tensor(np.eye(3)))
     index = ShardIndex(quality_histogram=to_tensor(np.arange(10)))
-    batches = (item, sample_batch(_samples(rng), ("a",)), _grasps(rng), index)
+    batches = (item, sample_batch(_samples(rng), ("a",)), _grasps(rng), index, _clouds(rng))
     for way in (0, 1):
         for compression in ("zstd", "lz4", "none"):
             with _folder() as folder:
@@ -212,6 +220,13 @@ def _samples(rng: np.random.Generator) -> Samples:
         proposal_weight=rng.random(2),
         pictures=np.ones(2, dtype=np.int64),
     )
+
+
+def _clouds(rng: np.random.Generator) -> CloudBatch:
+    """One cloud in steps."""
+    middles = (np.arange(3) - 1) * CELL_SIDE
+    cloud = np.stack([*np.meshgrid(middles, middles), rng.normal(size=(3, 3))], axis=-1)[None]
+    return cloud_batch(cloud, np.ones((1, 3, 3), dtype=bool), rounded=True)
 
 
 def _grasps(rng: np.random.Generator) -> GraspBatch:

@@ -18,11 +18,13 @@ from pipeline.artifacts.sharding import (
 from pipeline.errors import ArtifactError
 from pipeline.labelling.grasps import GraspOrigin, LabelledGrasps
 from pipeline.labelling.shown_pads import ShownPads
+from pipeline.messages.clouds import cloud_batch
 from pipeline.messages.grasps import (
     grasp_batch,
     grasps_of,
     pads_message,
     pads_of,
+    write_grasps,
 )
 from pipeline.messages.samples import sample_batch, samples_of
 from pipeline.network.samples import Samples, join_samples
@@ -62,7 +64,8 @@ ORIGIN = GraspOrigin("s1", "static", 3, "train", ("a", "b", "c"), ("Fx",), ("sol
 def test_grasps_round_trip(count: int) -> None:
     grasps = some_grasps(count)
     wire = grasp_batch(ORIGIN, grasps).SerializeToString()
-    origin, back = grasps_of(GraspBatch.FromString(wire))
+    clouds = cloud_batch(grasps.cloud, grasps.cloud_mask, rounded=False)
+    origin, back = grasps_of(GraspBatch.FromString(wire), clouds)
     assert origin == ORIGIN
     for field in fields(grasps):
         then, now = getattr(grasps, field.name), getattr(back, field.name)
@@ -96,7 +99,10 @@ def test_samples_round_trip_and_join() -> None:
     )
     parts = [samples.take(slice(0, 4)), samples.take(slice(4, 9))]
     wired = [
-        samples_of(SampleBatch.FromString(sample_batch(p, ("a",)).SerializeToString()))
+        samples_of(
+            SampleBatch.FromString(sample_batch(p, ("a",)).SerializeToString()),
+            cloud_batch(p.cloud, p.cloud_mask, rounded=False),
+        )
         for p in parts
     ]
     back = join_samples(wired)
@@ -110,7 +116,7 @@ def make_shards(folder: Path, provenance: Provenance) -> tuple[Path, list[ShardE
     for i, split in enumerate(("train", "test")):
         path = shard_path(folder / "grasps", i, 2)
         with ArtifactWriter(path, provenance) as artifact:
-            artifact.write("/grasps", grasp_batch(ORIGIN, some_grasps(2)), log_time_ns=0)
+            write_grasps(artifact, [(ORIGIN, some_grasps(2))], size=2, rounded=True)
         entries.append(shard_entry(path, folder, 2, split))
     write_index(index, provenance, entries, np.arange(10))
     return index, entries

@@ -11,7 +11,7 @@ from pipeline.artifacts.publishing import scratch_beside
 from pipeline.artifacts.sharding import shard_entry, shard_path, write_index
 from pipeline.errors import ArtifactError
 from pipeline.messages.sample_cache import cached_split
-from pipeline.messages.samples import sample_batch
+from pipeline.messages.samples import write_samples
 from pipeline.network.samples import Samples, join_samples
 
 
@@ -35,11 +35,8 @@ def sharded(folder: Path, provenance: Provenance, parts: list[Samples]) -> Path:
     index, entries = folder / "shards.mcap", []
     for number, part in enumerate([*parts, some_samples(3, seed=99)]):
         path = shard_path(folder / "shards", number, len(parts) + 1)
-        half = len(part) // 2
         with ArtifactWriter(path, provenance) as artifact:
-            for start, stop in ((0, half), (half, len(part))):
-                batch = sample_batch(part.take(slice(start, stop)), ("a",))
-                artifact.write("/samples", batch, log_time_ns=start)
+            write_samples(artifact, part, ("a",), size=-(-len(part) // 2))
         split = "train" if number < len(parts) else "test"
         entries.append(shard_entry(path, folder, len(part), split))
     write_index(index, provenance, entries, np.zeros(10))

@@ -10,9 +10,9 @@ from rerun.chunk import RrdReader
 from pipeline.artifacts import open_artifact
 from pipeline.artifacts.tensors import from_tensor
 from pipeline.execution import RunFolder
-from pipeline.messages.grasps import grasps_of
+from pipeline.messages.grasps import read_grasps
 from pipeline.messages.scenes import read_scenes
-from schemas.softgrip.v1.grasps_pb2 import GraspBatch, ShardIndex
+from schemas.softgrip.v1.grasps_pb2 import ShardIndex
 from schemas.softgrip.v1.training_pb2 import Epoch
 
 TIMELESS = -1
@@ -58,8 +58,8 @@ def test_grasps_histogram_and_labels(run: RunFolder) -> None:
     quality: list[float] = []
     for entry in index.shards:
         with open_artifact(run.path / entry.path) as shard:
-            for _, message in shard.messages(GraspBatch):
-                quality += grasps_of(message)[1].quality.tolist()
+            for _, grasps in read_grasps(shard, clouds=False):
+                quality += grasps.quality.tolist()
     labels = logged(path, "/curves/label/q", "Scalars:scalars", "grasp")
     assert sorted(labels) == list(range(len(labels)))
     for (value,) in labels.values():

@@ -16,12 +16,11 @@ from pipeline.artifacts.sharding import listed_shards
 from pipeline.execution import RunFolder
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.interchange.bop import silhouette
-from pipeline.messages.grasps import grasps_of
+from pipeline.messages.grasps import read_grasps
 from pipeline.messages.objects import read_objects
 from pipeline.messages.scenes import read_scenes
 from pipeline.world.scene import ClutterScene
 from pipeline.world.view import CameraView
-from schemas.softgrip.v1.grasps_pb2 import GraspBatch
 from stages.export import Format, export_run
 from tests.camera.scenes import box, seen
 
@@ -168,8 +167,7 @@ def test_openusd_reads_the_scene_with_its_grasps(
     poses, quality = [], []
     for shard in listed_shards(run.artifact("grasps")):
         with open_artifact(shard) as artifact:
-            for _, message in artifact.messages(GraspBatch):
-                origin, found = grasps_of(message)
+            for origin, found in read_grasps(artifact):
                 if origin.scene_id == scene.scene_id:
                     poses.append(found.world_from_gripper)
                     quality.append(found.quality)

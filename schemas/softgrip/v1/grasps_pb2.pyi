@@ -8,7 +8,7 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class GraspBatch(_message.Message):
-    __slots__ = ("scene_id", "viewpoint", "level", "split", "object_names", "object_index", "body_id", "world_from_gripper", "quality", "pressure", "wrench", "limit_slack", "limit_names", "weight_summary", "contact_mask", "pad_vertices", "status", "status_names", "iterations", "tilt_rad", "proposal", "proposal_names", "keep_probability", "cloud", "cloud_mask", "touch_height_m", "pictures")
+    __slots__ = ("scene_id", "viewpoint", "level", "split", "object_names", "object_index", "body_id", "world_from_gripper", "quality", "pressure", "wrench", "limit_slack", "limit_names", "weight_summary", "contact_mask", "pad_vertices", "status", "status_names", "iterations", "tilt_rad", "proposal", "proposal_names", "keep_probability", "cloud", "cloud_mask", "touch_height_m", "pictures", "key")
     SCENE_ID_FIELD_NUMBER: _ClassVar[int]
     VIEWPOINT_FIELD_NUMBER: _ClassVar[int]
     LEVEL_FIELD_NUMBER: _ClassVar[int]
@@ -36,6 +36,7 @@ class GraspBatch(_message.Message):
     CLOUD_MASK_FIELD_NUMBER: _ClassVar[int]
     TOUCH_HEIGHT_M_FIELD_NUMBER: _ClassVar[int]
     PICTURES_FIELD_NUMBER: _ClassVar[int]
+    KEY_FIELD_NUMBER: _ClassVar[int]
     scene_id: str
     viewpoint: str
     level: int
@@ -63,7 +64,8 @@ class GraspBatch(_message.Message):
     cloud_mask: _tensor_pb2.Tensor
     touch_height_m: _tensor_pb2.Tensor
     pictures: _tensor_pb2.Tensor
-    def __init__(self, scene_id: _Optional[str] = ..., viewpoint: _Optional[str] = ..., level: _Optional[int] = ..., split: _Optional[str] = ..., object_names: _Optional[_Iterable[str]] = ..., object_index: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., body_id: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., world_from_gripper: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., quality: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., pressure: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., wrench: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., limit_slack: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., limit_names: _Optional[_Iterable[str]] = ..., weight_summary: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., contact_mask: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., pad_vertices: _Optional[int] = ..., status: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., status_names: _Optional[_Iterable[str]] = ..., iterations: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., tilt_rad: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., proposal: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., proposal_names: _Optional[_Iterable[str]] = ..., keep_probability: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., cloud: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., cloud_mask: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., touch_height_m: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., pictures: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ...) -> None: ...
+    key: str
+    def __init__(self, scene_id: _Optional[str] = ..., viewpoint: _Optional[str] = ..., level: _Optional[int] = ..., split: _Optional[str] = ..., object_names: _Optional[_Iterable[str]] = ..., object_index: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., body_id: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., world_from_gripper: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., quality: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., pressure: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., wrench: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., limit_slack: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., limit_names: _Optional[_Iterable[str]] = ..., weight_summary: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., contact_mask: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., pad_vertices: _Optional[int] = ..., status: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., status_names: _Optional[_Iterable[str]] = ..., iterations: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., tilt_rad: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., proposal: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., proposal_names: _Optional[_Iterable[str]] = ..., keep_probability: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., cloud: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., cloud_mask: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., touch_height_m: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., pictures: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., key: _Optional[str] = ...) -> None: ...
 
 class DrapedPads(_message.Message):
     __slots__ = ("grasp", "height_m", "pressure")

@@ -16,7 +16,7 @@ class TriangleMesh(_message.Message):
     def __init__(self, vertices_m: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., faces: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ...) -> None: ...
 
 class CatalogueObject(_message.Message):
-    __slots__ = ("name", "split", "source", "source_sha256", "unit", "unit_origin", "repairs", "scale", "extent_m", "area_m2", "volume_m3", "nsvr", "shape_class", "mass_kg", "inertia_kg_m2", "mesh", "convex_parts", "material", "stretch", "family", "copies")
+    __slots__ = ("name", "split", "source", "source_sha256", "unit", "unit_origin", "repairs", "scale", "extent_m", "area_m2", "volume_m3", "nsvr", "shape_class", "mass_kg", "inertia_kg_m2", "mesh", "convex_parts", "material", "stretch", "family", "copies", "key")
     NAME_FIELD_NUMBER: _ClassVar[int]
     SPLIT_FIELD_NUMBER: _ClassVar[int]
     SOURCE_FIELD_NUMBER: _ClassVar[int]
@@ -38,6 +38,7 @@ class CatalogueObject(_message.Message):
     STRETCH_FIELD_NUMBER: _ClassVar[int]
     FAMILY_FIELD_NUMBER: _ClassVar[int]
     COPIES_FIELD_NUMBER: _ClassVar[int]
+    KEY_FIELD_NUMBER: _ClassVar[int]
     name: str
     split: str
     source: str
@@ -59,7 +60,8 @@ class CatalogueObject(_message.Message):
     stretch: _tensor_pb2.Tensor
     family: str
     copies: _containers.RepeatedScalarFieldContainer[str]
-    def __init__(self, name: _Optional[str] = ..., split: _Optional[str] = ..., source: _Optional[str] = ..., source_sha256: _Optional[str] = ..., unit: _Optional[str] = ..., unit_origin: _Optional[str] = ..., repairs: _Optional[_Iterable[str]] = ..., scale: _Optional[float] = ..., extent_m: _Optional[float] = ..., area_m2: _Optional[float] = ..., volume_m3: _Optional[float] = ..., nsvr: _Optional[float] = ..., shape_class: _Optional[str] = ..., mass_kg: _Optional[float] = ..., inertia_kg_m2: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., mesh: _Optional[_Union[TriangleMesh, _Mapping]] = ..., convex_parts: _Optional[_Iterable[_Union[TriangleMesh, _Mapping]]] = ..., material: _Optional[str] = ..., stretch: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., family: _Optional[str] = ..., copies: _Optional[_Iterable[str]] = ...) -> None: ...
+    key: str
+    def __init__(self, name: _Optional[str] = ..., split: _Optional[str] = ..., source: _Optional[str] = ..., source_sha256: _Optional[str] = ..., unit: _Optional[str] = ..., unit_origin: _Optional[str] = ..., repairs: _Optional[_Iterable[str]] = ..., scale: _Optional[float] = ..., extent_m: _Optional[float] = ..., area_m2: _Optional[float] = ..., volume_m3: _Optional[float] = ..., nsvr: _Optional[float] = ..., shape_class: _Optional[str] = ..., mass_kg: _Optional[float] = ..., inertia_kg_m2: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., mesh: _Optional[_Union[TriangleMesh, _Mapping]] = ..., convex_parts: _Optional[_Iterable[_Union[TriangleMesh, _Mapping]]] = ..., material: _Optional[str] = ..., stretch: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., family: _Optional[str] = ..., copies: _Optional[_Iterable[str]] = ..., key: _Optional[str] = ...) -> None: ...
 
 class RefusedMesh(_message.Message):
     __slots__ = ("source", "reason", "remedy")

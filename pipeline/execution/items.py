@@ -1,0 +1,129 @@
+"""Keys of single items: what one object, scene or scene's grasps rests on, whatever lies beside it.
+
+A stage's own key changes with every mesh that is added and with every count that is raised. An
+item's does not: it holds what all items of the stage rest on, less counts, and what this one does.
+"""
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+from pipeline.config import RunConfig, section_digest
+from pipeline.execution.freshness import Key
+from pipeline.geometry.catalogue import CatalogueObject
+from pipeline.world.scene import ClutterScene
+
+# What says how many items there are, which is no property of any.
+OBJECT_COUNTS = ("objects.limit", "objects.embedded_in_training", "objects.stretched_copies")
+SCENE_COUNTS = (
+    *("scenes.levels", "scenes.clutters_per_level", "scenes.splits", "scenes.impossible"),
+    "scenes.test_seed",  # in the seed of each scene that it decides
+)
+GRASP_COUNTS = ("grasps.count",)
+
+
+def items_basis(
+    key: Key, config: RunConfig, sections: tuple[str, ...], besides: tuple[str, ...]
+) -> str:
+    """Digest of what all items of a stage rest on.
+
+    Parameters
+    ----------
+    key
+        Of the stage; its code and machine count.
+    config
+        The run's configuration.
+    sections
+        Sections that items depend on.
+    besides
+        Fields of these, dotted, that do not count.
+
+    Returns
+    -------
+    The digest, as hex.
+    """
+    return _digest([section_digest(config, sections, besides), key.code, key.machine])
+
+
+def with_object_keys(
+    items: Sequence[CatalogueObject], key: Key, config: RunConfig
+) -> list[CatalogueObject]:
+    """Objects with their keys; split, family and copies depend on other objects and do not count.
+
+    Parameters
+    ----------
+    items
+        The objects of a catalogue.
+    key
+        Of stage objects.
+    config
+        The run's configuration.
+
+    Returns
+    -------
+    The same objects, each with its key.
+    """
+    basis = items_basis(key, config, ("seed", "objects"), OBJECT_COUNTS)
+    return [
+        replace(
+            item,
+            key=item_key(
+                basis,
+                content=item.content,
+                name=item.name,
+                unit=item.unit,
+                mass_kg=item.mass_kg,
+                stretch=item.stretch.tolist(),
+            ),
+        )
+        for item in items
+    ]
+
+
+def scenes_basis(key: Key, config: RunConfig) -> str:
+    """What all scenes of stage scenes, whose key is given, rest on."""
+    return items_basis(key, config, ("scenes", "cameras"), SCENE_COUNTS)
+
+
+def with_scene_key(
+    scene: ClutterScene, basis: str, pool: Sequence[CatalogueObject]
+) -> ClutterScene:
+    """A scene with its key.
+
+    Parameters
+    ----------
+    scene
+        The scene.
+    basis
+        What all scenes rest on, by `scenes_basis`.
+    pool
+        The objects that its members were drawn from.
+
+    Returns
+    -------
+    The same scene with its key.
+    """
+    keys = [item.key for item in pool]
+    return replace(scene, key=item_key(basis, scene=scene.scene_id, seed=scene.seed, pool=keys))
+
+
+def item_key(basis: str, **parts: str | float | Sequence[str] | Sequence[float]) -> str:
+    """Key of one item.
+
+    Parameters
+    ----------
+    basis
+        What all items of its stage rest on, by `items_basis`.
+    **parts
+        What this item rests on besides, by name.
+
+    Returns
+    -------
+    The digest, as hex.
+    """
+    return _digest([basis, parts])
+
+
+def _digest(value: Mapping[str, object] | list[object]) -> str:
+    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
