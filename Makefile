@@ -21,7 +21,7 @@ PY      := .venv/bin/python
 ifeq (,$(filter dataset objects scenes grasps shards bench holdout,$(MAKECMDGOALS) $(GOAL)))
 MESH_DIR := $(or $(MESH_DIR),$(shell cat $(STATE)/mesh_dir 2>/dev/null))
 endif
-export RUN MESH_DIR WORKERS
+export RUN MESH_DIR WORKERS SQL
 ifeq (,$(strip $(MESH_DIR)))
 unexport MESH_DIR
 endif
@@ -29,7 +29,7 @@ ifeq (,$(strip $(WORKERS)))
 unexport WORKERS
 endif
 
-.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee holdout folds release review report export predict real calibrate live robot board docs lint fuzz regress plan list prune seal unseal clean FORCE
+.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee holdout folds release review report export predict real calibrate live robot board docs lint fuzz regress plan list prune seal unseal query clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -78,6 +78,9 @@ status: .venv/.ready  ## what is stale, and why
 
 plan: .venv/.ready  ## what 'make GOAL' will do, about how long and how much disk: GOAL=dataset|train|eval
 	@$(PY) -m stages.freshness plan $(or $(GOAL),eval)
+
+query: .venv/.ready  ## ask RUN in SQL: SQL="SELECT ..." [OUT=file.csv|.parquet SHOW=1]; without SQL the tables
+	@$(PY) -m stages.query $(if $(OUT),--out "$(OUT)") $(if $(SHOW),--show)
 
 # --- many runs ---
 list: .venv/.ready  ## every run: disk, stages, headline figures, stale or not, what it was made from

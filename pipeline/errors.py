@@ -57,5 +57,9 @@ class SceneError(SoftgripError):
     """A clutter scene does not meet the definition of its level."""
 
 
+class QueryError(SoftgripError):
+    """A question about a run cannot be answered."""
+
+
 class MachineError(SoftgripError):
     """The machine lacks something that a stage needs."""

@@ -1,7 +1,8 @@
 """What of a run can be made again from the rest of it, and freed.
 
 Kept: artifacts, shards, recordings, summaries, pages, run.toml and what lies beside it. Freed: the
-unpacked copy of the shards that training reads, resume points of stages that are finished, exports.
+unpacked copy of the shards that training reads, tables that questions were asked of, resume points
+of stages that are finished, exports.
 Folders that all runs share (`runs/.cache`) are never touched, nor is a run that a process works in.
 """
 
@@ -12,6 +13,7 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
+from pipeline.asking.cache import QUERY_CACHE
 from pipeline.execution.running import read_summary
 from pipeline.execution.stage import RunFolder
 from pipeline.execution.staleness import built_key
@@ -56,6 +58,7 @@ def freeable(folder: RunFolder, stages: tuple[str, ...]) -> list[Freeable]:
     """
     found = [
         *_unpacked_samples(folder),
+        (folder.state(QUERY_CACHE), "make query, from the artifacts"),
         *(
             (folder.state(stage), f"not needed: {stage} is finished")
             for stage in stages

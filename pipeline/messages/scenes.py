@@ -125,6 +125,12 @@ def read_placed(path: Path, index: int) -> tuple[PlacedObject, ...]:
         return _placed(message)
 
 
+def read_placements(path: Path) -> dict[str, tuple[PlacedObject, ...]]:
+    """Scene id → its objects where they lie, in the order of the scenes; no image is read."""
+    with open_artifact(path) as artifact:
+        return {scene.scene_id: _placed(scene) for _, scene in artifact.messages(scenes_pb2.Scene)}
+
+
 def read_scenes(path: Path) -> Iterator[ClutterScene]:
     """All scenes, in order, one in memory at a time."""
     for index in range(scene_count(path)):

@@ -26,6 +26,7 @@ PAGES = {  # page of the repository → file of the site
     "runs/README.md": "running.html",
     "stages/README.md": "stages.html",
     "schemas/README.md": "files.html",
+    "schemas/TABLES.md": "tables.html",
     "CHANGELOG.md": "changelog.html",
 }
 

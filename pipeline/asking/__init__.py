@@ -1,0 +1,1 @@
+"""Questions about a run in SQL: artifacts as tables, asked by DuckDB."""

@@ -1,0 +1,87 @@
+"""SQL over the tables of one run, by DuckDB; what is wrong is told with the columns that exist."""
+
+import difflib
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+import duckdb
+import pyarrow as pa
+
+from pipeline.asking.cache import arrow_table
+from pipeline.errors import QueryError
+from schemas.tables import BY_NAME, TABLES
+
+
+def ask(sql: str, artifacts: Mapping[str, Path], cache: Path) -> pa.Table:
+    """Answer a question.
+
+    Parameters
+    ----------
+    sql
+        One or more statements of DuckDB's SQL; the answer is the last one's.
+    artifacts
+        Stage → its artifact, of the stages that are made.
+    cache
+        Folder of the tables' Arrow files.
+
+    Returns
+    -------
+    The answer.
+
+    Raises
+    ------
+    QueryError
+        DuckDB cannot answer it, or it asks for a table whose stage is not made.
+    """
+    with duckdb.connect() as connection:
+        # A name in SQL is a table or a file, never a variable of this program.
+        connection.execute("SET python_enable_replacements = false")
+        for name in mentioned(sql):
+            stage = BY_NAME[name].stage
+            if stage in artifacts:
+                connection.register(name, arrow_table(name, artifacts[stage], cache))
+        try:
+            relation = connection.sql(sql)
+            if relation is None:
+                raise QueryError("The last statement answers nothing", "End with a SELECT")
+            return relation.to_arrow_table()
+        except duckdb.Error as error:
+            raise QueryError(str(error), remedy_of(sql, str(error), artifacts)) from error
+
+
+def mentioned(sql: str) -> list[str]:
+    """Tables whose name stands in a question; no other is read."""
+    words = set(re.findall(r"\w+", sql.lower()))
+    return [table.name for table in TABLES if table.name in words]
+
+
+def remedy_of(sql: str, reason: str, artifacts: Mapping[str, Path]) -> str:
+    """What a person may do about a question that failed: the columns, or the tables, that exist.
+
+    Parameters
+    ----------
+    sql
+        The question.
+    reason
+        DuckDB's message.
+    artifacts
+        Stage → its artifact, of the stages that are made.
+
+    Returns
+    -------
+    A sentence.
+    """
+    asked = mentioned(sql)
+    missing = [name for name in asked if BY_NAME[name].stage not in artifacts]
+    if missing:
+        stages = dict.fromkeys(BY_NAME[name].stage for name in missing)
+        return f"Make them first, or leave out {', '.join(missing)}: {', '.join(stages)} not made"
+    if not asked:
+        return f"Tables are {', '.join(BY_NAME)}"
+    columns = {name: [column.name for column in BY_NAME[name].columns] for name in asked}
+    every = [column for names in columns.values() for column in names]
+    quoted = re.search(r'column "([^"]+)"', reason)
+    near = difflib.get_close_matches(quoted[1], every, n=1) if quoted else []
+    told = "; ".join(f"{name}: {', '.join(names)}" for name, names in columns.items())
+    return f"{f'Did you mean {near[0]}? ' if near else ''}Columns are {told}"
