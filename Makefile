@@ -165,9 +165,10 @@ predict: .venv/.ready  ## grasps on a real picture: DEPTH=file [camera=file mask
 	@test -n "$(DEPTH)" || { echo "Give the picture: make predict DEPTH=file.depth.png"; exit 1; }
 	@$(PY) -m stages.predict $(DEPTH) $(PREDICT_OPTIONS)
 
-real: .venv/.ready  ## network and baseline on real frames: FRAMES=folder [tilt_deg=90 ...], to runs/<run>/real
-	@test -n "$(FRAMES)" || { echo "Give the frames: make real FRAMES=folder"; exit 1; }
-	@$(PY) -m stages.real $(FRAMES) $(foreach option,tilt-deg radius-mm out,$(if $($(subst -,_,$(option))),--$(option) "$($(subst -,_,$(option)))"))
+real: .venv/.ready  ## on real frames: FRAMES=folder [tilt_deg=90 ...]; q-hat against tried grasps: ATTEMPTS=files; to runs/<run>/real
+	@test -n "$(FRAMES)$(ATTEMPTS)" || { echo "Give the frames, or logged attempts: make real FRAMES=folder, make real ATTEMPTS=folder"; exit 1; }
+	@test -z "$(FRAMES)" || $(PY) -m stages.real $(FRAMES) $(foreach option,tilt-deg radius-mm out,$(if $($(subst -,_,$(option))),--$(option) "$($(subst -,_,$(option)))"))
+	@test -z "$(ATTEMPTS)" || $(PY) -m stages.tried $(ATTEMPTS) $(if $(out),--out "$(out)")
 
 calibrate: .venv/.ready  ## from which q-hat on RUN's network (or NETWORK) is right, to runs/<run>/calibration.json
 	@$(PY) -m stages.calibrate
@@ -205,5 +206,5 @@ fuzz: .venv/.ready  ## coverage-guided fuzzing of the readers, SECONDS_A_READER 
 	@for reader in mesh toml mcap checkpoint; do \
 	  $(PY) -m tests.fuzz $$reader --seconds $(SECONDS_A_READER) || exit 1; done
 
-clean:  ## remove what run RUN produced, keep its run.toml, families.toml and masses.toml
-	find $(R) -mindepth 1 ! -name run.toml ! -name families.toml ! -name masses.toml -delete
+clean:  ## remove what run RUN produced, keep run.toml, families.toml, masses.toml and a robot's attempts
+	find $(R) -mindepth 1 ! -name run.toml ! -name families.toml ! -name masses.toml ! -path '$(R)/robot' ! -path '$(R)/robot/*' -delete

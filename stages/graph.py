@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from pipeline.artifacts.listing import artifacts_in
 from pipeline.config import load_run_config
 from pipeline.errors import ConfigError
 from pipeline.execution.stage import RunFolder, Stage
@@ -60,6 +61,7 @@ MADE = {**STAGES, SWEEP.name: SWEEP}
 RUNS_DIR = Path("runs")
 # A network in a run's folder that stands in the place of one trained there; `make holdout`.
 GIVEN_NETWORK = "network.onnx"
+ATTEMPTS = "attempts/"  # before the number of each input that ``train.attempts`` names
 
 
 def inputs_of(stage: Stage, folder: RunFolder, mesh_dir: Path | None) -> dict[str, Path]:
@@ -79,6 +81,9 @@ def inputs_of(stage: Stage, folder: RunFolder, mesh_dir: Path | None) -> dict[st
         ):
             if path := told_of_objects(folder, mesh_dir, file, named_by, named):
                 inputs[file] = path
+    if stage is TRAIN:
+        logged = [folder.path / one for one in load_run_config(folder.config).train.attempts]
+        inputs |= {f"{ATTEMPTS}{n}": path for n, path in enumerate(artifacts_in(logged))}
     return inputs
 
 

@@ -6,7 +6,7 @@ a file of its own, runs/<run>/robot/attempt_<nnnnn>.mcap, written before the nex
 
 import importlib.util
 from pathlib import Path
-from typing import Annotated, cast
+from typing import Annotated, cast, get_args
 
 import numpy as np
 import typer
@@ -50,6 +50,8 @@ def robot(
     out: Annotated[Path | None, typer.Option(help="folder; else runs/<run>/robot")] = None,
 ) -> None:
     """Pick with a robot until nothing is seen any more, and log every attempt."""
+    if policy not in get_args(PolicyName):
+        raise typer.BadParameter(f"--policy is one of {', '.join(get_args(PolicyName))}")
     config = predict_config(run, radius_mm, None, None)
     held = read_calibration(calibration)
     opened = opened_driver(driver)

@@ -12,6 +12,7 @@ from loguru import logger
 
 from pipeline.artifacts import ArtifactWriter, publish_bytes
 from pipeline.execution import StageContext, Summary, stage_command
+from pipeline.messages.attempts import read_attempts, tried_contacts
 from pipeline.messages.sample_cache import cached_split
 from pipeline.messages.training import (
     BASELINE,
@@ -26,14 +27,15 @@ from pipeline.network.export import export_onnx_bytes
 from pipeline.network.fitted_baselines import fit_baselines
 from pipeline.network.ga_cnn import parameter_count
 from pipeline.network.held_out import TestFigures, measure_held_out
+from pipeline.network.outcomes import outcome_samples, with_outcomes
 from pipeline.network.parallel import ALONE, Ranks, join_ranks
 from pipeline.network.resuming import EpochMetrics
-from pipeline.network.samples import Samples
+from pipeline.network.samples import GraspTensors, Samples
 from pipeline.network.sources import baseline_to_json
 from pipeline.network.timing import runtimes_ms_a_grasp
 from pipeline.network.training import TrainedNetwork, choose_device, train
 from pipeline.recording.train import draw_train
-from stages.graph import TRAIN, inputs_of
+from stages.graph import ATTEMPTS, TRAIN, inputs_of
 
 COMPARED = 512  # test clouds on which the export for control is held against its original
 SAMPLES = "samples"  # folder of the decoded shards, in the run's state
@@ -48,7 +50,7 @@ def build(stage: StageContext, ranks: Ranks = ALONE) -> Summary:
         config.train,
         config.network,
         config.seed,
-        train_set.tensors,
+        train_tensors(stage, train_set),
         val_set.tensors,
         stage.folder.state("train"),
         print_epoch,
@@ -84,6 +86,24 @@ def build(stage: StageContext, ranks: Ranks = ALONE) -> Summary:
 def split_of(stage: StageContext, split: str) -> Samples:
     """A split's samples, decoded from its shards once and mapped from there."""
     return cached_split(stage.upstream("shards"), split, stage.folder.state(SAMPLES))
+
+
+def train_tensors(stage: StageContext, train_set: Samples) -> GraspTensors:
+    """The train split and, where ``train.attempts`` names some, what logged attempts lifted."""
+    files = [path for name, path in sorted(stage.inputs.items()) if name.startswith(ATTEMPTS)]
+    if not files:
+        return train_set.tensors
+    wanted = stage.config.train
+    tried = tried_contacts(read_attempts(files))
+    outcomes = outcome_samples(tried, train_set.quality, wanted.attempt_good_quality)
+    logger.info(
+        "train: {} tried contacts, of which {} lifted, {} times each beside {} samples",
+        len(outcomes),
+        int(tried.lifted.sum()),
+        wanted.attempt_repeats,
+        len(train_set),
+    )
+    return with_outcomes(train_set.tensors, outcomes, wanted.attempt_repeats)
 
 
 def print_epoch(epoch: EpochMetrics) -> None:

@@ -72,6 +72,21 @@ class TrainConfig(Section):
     )
     gradient_norm_max: float = Field(1.0, gt=0, le=1e6, description="longer gradients are cut")
     patience_epochs: int = Field(15, ge=1, description="stop after so many epochs without gain")
+    attempts: tuple[str, ...] = Field(
+        (),
+        description="files of logged attempts, or folders of them, beside run.toml: what they "
+        "lifted and what not is trained on too",
+    )
+    attempt_repeats: int = Field(
+        1, ge=1, le=10_000, description="how often each tried contact counts among the samples"
+    )
+    attempt_good_quality: float = Field(
+        0.5,
+        gt=0,
+        lt=1,
+        description="a contact that lifted is labelled by the mean q of training samples from "
+        "this q on, one that did not by the mean of the others [1]",
+    )
     augment: bool = Field(True, description="turn and mirror clouds about the approach axis")
     baseline_samples: int = Field(
         400,

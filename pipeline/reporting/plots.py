@@ -127,6 +127,46 @@ def calibration(predicted: Sequence[float], true: Sequence[float], count: Sequen
         return _svg(figure)
 
 
+def lifted_by_quality(by_ranking: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
+    """Share of tried contacts that lifted, with its interval, over mean q-hat, a curve a ranking.
+
+    Parameters
+    ----------
+    by_ranking
+        Name of a source of q-hat → bins with ``mean_predicted``, ``share``, ``interval_95`` and
+        ``contacts``, which stands beside each point.
+
+    Returns
+    -------
+    SVG.
+    """
+    with mpl.rc_context(STYLE):
+        figure, (axes,) = _axes(1, 3.2, width=4.4)
+        axes.plot([0, 1], [0, 1], color="0.6", lw=0.8, ls="--", label="q̂")
+        for number, (name, bins) in enumerate(by_ranking.items()):
+            x = [one["mean_predicted"] for one in bins]
+            share = np.array([one["share"] for one in bins])
+            low, high = np.array([one["interval_95"] for one in bins]).T
+            axes.errorbar(
+                x,
+                share,
+                yerr=np.clip([share - low, high - share], 0, None),
+                color=_rgb(PALETTE[4 + number]),
+                marker=MARKERS[number],
+                ls=DASHES[number],
+                capsize=2,
+                label=name,
+            )
+            for at, height, one in zip(x, share, bins, strict=True):
+                axes.annotate(
+                    str(one["contacts"]), (at, height), (4, 4), textcoords="offset points"
+                )
+        axes.set(xlabel="mean predicted q̂ [1]", ylabel="share lifted [1]", xlim=(0, 1))
+        axes.set_ylim(-0.02, 1.08)
+        axes.legend(loc="upper left")
+        return _svg(figure)
+
+
 def fig_1(members: Sequence[TrainedMember], mean_predictor: float) -> str:
     """Supplement IV, Fig. 1: error and time against depth, a curve a channel set."""
     with mpl.rc_context(STYLE):

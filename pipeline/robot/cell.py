@@ -29,6 +29,7 @@ SIGMAS = 3.0  # a threshold this many standard deviations over noise is rarely p
 # The arm has arrived where it lags by less; where it lags by more than _LOST_M it does not follow.
 _ARRIVED_M, _ARRIVED_RAD, _LAG_M, _LOST_M = 1e-4, 1e-3, 0.002, 0.03
 _SETTLE_S = 1.0  # an arm that has not come to rest at its last setpoint by then does not follow
+_AT_HOME_M = 0.01  # the arm is out of sight where the pad is this near to home
 _LEVER_M = 0.2  # a turn counts as the way of a point this far from the axis
 
 
@@ -50,9 +51,18 @@ class DrivenEyes:
         self._driver = driver
         self._calibration = calibration
         self._config = config
+        self._from_home: list[DepthPicture] = []
 
     def static(self) -> list[DepthPicture] | None:
-        """One picture of every camera beside the table."""
+        """One picture of every camera beside the table, the arm out of their sight.
+
+        Away from home the arm would be seen as something to grip, so the last pictures that were
+        taken with the arm at home are given again.
+        """
+        here = world_from_gripper(self._driver, self._calibration)
+        away_m = np.linalg.norm(here[:3, 3] - self._calibration.home[:3, 3])
+        if away_m > _AT_HOME_M and self._from_home:
+            return self._from_home
         depths = self._driver.static_depths_m()
         if depths is None:
             return None
@@ -63,10 +73,11 @@ class DrivenEyes:
                 "calibrated",
                 "Give one of each camera, in the order of static_cameras",
             )
-        return [
+        self._from_home = [
             DepthPicture(in_range(depth, camera), camera)
             for depth, camera in zip(depths, cameras, strict=True)
         ]
+        return self._from_home
 
     def wrist_camera(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> PinholeCamera:
         """The wrist's camera as it is calibrated, for the gripper at a pose."""

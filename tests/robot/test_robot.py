@@ -2,12 +2,15 @@
 
 import json
 import math
+import shutil
+import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import typer
 
 from pipeline.artifacts import from_tensor, open_artifact
 from pipeline.config import RunConfig
@@ -20,7 +23,7 @@ from pipeline.world.cameras import points_of_depth
 from schemas.softgrip.v1.evaluation_pb2 import Attempt
 from stages.robot import next_number, opened_driver, robot
 from tests.robot import vendor
-from tests.robot.conftest import EXAMPLE, calibration, world_of
+from tests.robot.conftest import EXAMPLE, ROOT, calibration, world_of
 from tests.robot.vendor import World
 
 Cell = tuple[Path, World]
@@ -149,14 +152,16 @@ def test_pictures_and_calibration_give_the_boxes_where_they_are(
 ) -> None:
     eyes, arm, world = parts
     arm.begin()
+    static = eyes.static()
+    assert static is not None
     above = gripper_above(np.array([0.02, 0.0, 0.3]), 0.0, np.eye(4))
     for _ in range(60):
         arm.step(above, 0.8)
-    (static,) = eyes.static() or []
+    assert eyes.static() is static  # the arm is in the way now
     wrist = eyes.wrist(np.array([0.0, 0.0, 0.06]), 0.05)
     assert wrist is not None
     assert wrist.camera.width_px < world.cameras["wrist"]["width"]
-    for picture in (static, wrist):
+    for picture in (static[0], wrist):
         points, _, _ = points_of_depth(picture.depth_m, picture.camera, 1, above_m=0.05)
         assert len(points) > 300
         assert points[:, 2] == pytest.approx(0.06, abs=1e-5)
@@ -262,6 +267,11 @@ def test_a_cell_without_a_pressure_sensor_has_no_pressure(tmp_path: Path) -> Non
     assert math.isnan(read_calibration(path).pressure(math.nan))
 
 
+def test_a_policy_that_there_is_not_is_told(cell: Cell, tmp_path: Path) -> None:
+    with pytest.raises(typer.BadParameter, match="closed-loop, uncorrected"):
+        robot(EXAMPLE, cell[0], policy="best", run="ci", out=tmp_path)
+
+
 def test_a_file_that_is_no_driver_is_told(tmp_path: Path) -> None:
     with pytest.raises(CalibrationError, match="is no Python file"):
         opened_driver(tmp_path / "none.py")
@@ -271,3 +281,14 @@ def test_a_file_that_is_no_driver_is_told(tmp_path: Path) -> None:
     (tmp_path / "broken.json").write_text("{")
     with pytest.raises(CalibrationError, match="cannot be read as JSON"):
         read_calibration(tmp_path / "broken.json")
+
+
+def test_cleaning_a_run_keeps_what_a_robot_tried(tmp_path: Path) -> None:
+    shutil.copy(ROOT / "Makefile", tmp_path)
+    run = tmp_path / "runs" / "mine"
+    for name in ("run.toml", "grasps.mcap", "logs/grasps.log", "robot/attempt_00000.mcap"):
+        (run / name).parent.mkdir(parents=True, exist_ok=True)
+        (run / name).touch()
+    subprocess.run(["make", "-s", "clean", "RUN=mine"], cwd=tmp_path, check=True)
+    left = {path.relative_to(run).as_posix() for path in run.rglob("*") if path.is_file()}
+    assert left == {"run.toml", "robot/attempt_00000.mcap"}
