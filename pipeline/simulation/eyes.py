@@ -19,7 +19,7 @@ from pipeline.control.cloud import DepthPicture
 from pipeline.control.own_body import cut_gripper_out
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.mesh import Mesh
-from pipeline.geometry.transforms import look_at
+from pipeline.geometry.transforms import invert, look_at
 from pipeline.sensing.depth_by_rays import measure_depth, window_around
 from pipeline.simulation.imperfection import Calibration
 from pipeline.world.cameras import PinholeCamera, camera_at, static_cameras
@@ -83,6 +83,10 @@ class SimulatedEyes:
         self._surfaces = PosedBodies(meshes, config.scenes.table_side_m)
         self._transparent = {i for i, item in objects.items() if item.material == "transparent"}
         self._beside = static_cameras(config.cameras.static)
+        self._beside_errors = [
+            level_error(camera.world_from_camera, error)
+            for camera, error in zip(self._beside, calibration.beside, strict=True)
+        ]
         self._on_wrist = camera_at("wrist", config.cameras.wrist, _ORIGIN, 1.0, 0.0, 0.0)
         self._gripper_from_camera = gripper_from_camera(config.evaluate.hand)
 
@@ -91,7 +95,7 @@ class SimulatedEyes:
         gripper, bodies = self._seen.state_before(0.0)
         pictures = [
             self._taken(camera, error, gripper, bodies, 0.0)
-            for camera, error in zip(self._beside, self._calibration.beside, strict=True)
+            for camera, error in zip(self._beside, self._beside_errors, strict=True)
         ]
         self._seen.wait(self._imperfection.scale * self._imperfection.latency_s)
         return pictures
@@ -158,6 +162,31 @@ class SimulatedEyes:
             self._config.gripper.pad,
             self._imperfection.own_margin_m,
         )
+
+
+def level_error(world_from_camera: Pose, camera_from_believed: Pose) -> Pose:
+    """What is left of an error of a camera's pose when the table is seen level and at its height.
+
+    A cell's cameras are checked against its table. Left are the shift of the table's middle along
+    the table, and the turn about the vertical.
+
+    Parameters
+    ----------
+    world_from_camera
+        True pose, shape (4, 4).
+    camera_from_believed
+        The error, shape (4, 4).
+
+    Returns
+    -------
+    camera_from_believed, shape (4, 4), that moves the table within itself.
+    """
+    moved = world_from_camera @ camera_from_believed @ invert(world_from_camera)
+    turn = np.arctan2(moved[1, 0] - moved[0, 1], moved[0, 0] + moved[1, 1])
+    level = np.eye(4)
+    level[:2, :2] = [[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]
+    level[:2, 3] = moved[:2, 3]
+    return np.asarray(invert(world_from_camera) @ level @ world_from_camera)
 
 
 def gripper_mesh(hand: HandConfig, pad: PadConfig) -> Mesh:

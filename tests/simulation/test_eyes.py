@@ -10,6 +10,7 @@ import trimesh
 from pipeline.config import RunConfig
 from pipeline.config.evaluation import HandConfig
 from pipeline.config.grasps import PadConfig
+from pipeline.config.imperfection import ImperfectionConfig
 from pipeline.control.cloud import DepthPicture, merged_cloud
 from pipeline.control.own_body import cut_gripper_out
 from pipeline.control.viewpoints import gripper_above
@@ -17,7 +18,7 @@ from pipeline.geometry.transforms import look_at
 from pipeline.sensing.depth_by_rays import measure_depth
 from pipeline.simulation.eyes import SimulatedEyes, gripper_from_camera, gripper_mesh, place_camera
 from pipeline.simulation.gripper_body import SuctionGripper
-from pipeline.simulation.imperfection import Calibration
+from pipeline.simulation.imperfection import Calibration, draw_calibration
 from pipeline.simulation.picking import Clutter
 from pipeline.simulation.scenarios import SCENARIOS, make_trials
 from pipeline.world.cameras import camera_at
@@ -103,6 +104,17 @@ def test_an_error_of_a_camera_beside_the_table_shifts_its_cloud(tmp_path: Path) 
         assert pictures is not None
         shifts.append(middle_m(pictures[0]))
     assert np.linalg.norm(shifts[1] - shifts[0]) == pytest.approx(0.004, abs=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_an_error_beside_the_table_leaves_the_table_level(seed: int, tmp_path: Path) -> None:
+    """Large errors of the calibration make no objects of the table."""
+    config = ImperfectionConfig(scale=4.0)
+    wrong = draw_calibration(config, 1, np.random.default_rng(seed))
+    pictures = eyes_on(exact(1.0), wrong, tmp_path, StillWorld()).static()
+    assert pictures is not None
+    points = merged_cloud(pictures, 0.002, 0.001).points_m
+    assert (np.hypot(points[:, 0], points[:, 1]) < 0.08).all()
 
 
 def test_the_gripper_hides_what_is_behind_it_and_is_no_object(tmp_path: Path) -> None:
