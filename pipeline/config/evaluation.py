@@ -60,6 +60,19 @@ class TransportConfig(ScaledSection):
         return values
 
 
+class CeilingConfig(Section):
+    """The best that could be done: how many poses are tried on each object as it lies."""
+
+    poses: int = Field(
+        0, ge=0, le=100_000, description="reachable poses on each object; 0: no ceiling is told"
+    )
+    judged: int = Field(
+        16, ge=1, le=10_000, description="of these, the likeliest by the label, that are judged"
+    )
+    steps: int = Field(2, ge=0, le=100, description="how often poses near the best are judged")
+    nearby: int = Field(9, ge=1, le=1000, description="poses judged in each such step")
+
+
 class HandConfig(ScaledSection):
     """The gripper's rigid part and the camera on it, in GCS: +z from the pad to the flange."""
 
@@ -185,6 +198,7 @@ class EvaluateConfig(Section):
     suction: SuctionConfig = SuctionConfig()
     lift: LiftConfig = LiftConfig()
     transport: TransportConfig = TransportConfig()
+    ceiling: CeilingConfig = CeilingConfig()
     hand: HandConfig = HandConfig()
     arm: ArmConfig = ArmConfig()
     policy: PolicyConfig = PolicyConfig()

@@ -96,6 +96,11 @@ class JudgedAttempt:
         State at the end of each control step.
     seen
         Every picture that the policy took, in order.
+    body_id
+        Of the object under the pad; 0 where there is none, or nothing knows it.
+    ceilings_n
+        By body id, before the attempt: the weight that the best pose bears, and the weight [N];
+        empty where it was not looked for.
     """
 
     decision: Decision
@@ -110,6 +115,8 @@ class JudgedAttempt:
     reached_pose: Float[np.ndarray, "4 4"]
     samples: list[Sample]
     seen: list[SeenPicture] = field(default_factory=list)
+    body_id: int = 0
+    ceilings_n: dict[int, tuple[float, float]] = field(default_factory=dict)
 
 
 class LoggedEyes:

@@ -64,6 +64,11 @@ def attempt_message(
         "base_wrench": np.array([s.wrench for s in samples]).reshape(-1, 6),
         "pressure": np.array([s.pressure for s in samples]),
     }
+    if made.ceilings_n:
+        nothing = (np.nan, np.nan)
+        arrays["ceilings_n"] = np.array(
+            [made.ceilings_n.get(i, nothing) for i in range(1, bodies + 1)]
+        )
     joints = np.array([s.joints_rad for s in samples])
     if joints.size:
         arrays["joint_path"] = joints
@@ -97,6 +102,7 @@ def attempt_message(
             for one in decision.tried
         ],
         judge=judge,
+        target_body=made.body_id,
         pad_radius_m=config.gripper.pad.radius_m,
         **{name: to_tensor(np.asarray(array, np.float64)) for name, array in arrays.items()},
     )

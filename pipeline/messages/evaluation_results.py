@@ -4,8 +4,10 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from google.protobuf.message import Message
 
+from pipeline.artifacts.tensors import from_tensor
 from pipeline.config.evaluation import PolicyName
 from pipeline.control.success import Outcome, advantage, bootstrap_interval, success_rate
 from pipeline.world.scene import ClutterScene
@@ -132,6 +134,7 @@ def _result(
         for acceleration in accelerations_m_s2
     }
     time_s = sum(made.duration_s for made in mine)
+    could = could_be_lifted(mine)
     return LevelResult(
         policy=policy,
         level=level,
@@ -149,7 +152,59 @@ def _result(
         seals=sum(made.seals for made in mine),
         lifted_at_first_seal=sum(made.outcome == "lifted" and made.seals == 1 for made in mine),
         carried=carried,
+        liftable=could.objects,
+        attempts_at_liftable=could.attempts,
+        lifted_unforeseen=could.unforeseen,
     )
+
+
+@dataclass(frozen=True)
+class CouldBeLifted:
+    """What could be lifted at all, by the ceilings that attempts tell.
+
+    Attributes
+    ----------
+    objects
+        Objects that some pose could lift as they lay before some attempt, or that were lifted.
+    attempts
+        Attempts at an object that could be lifted as it lay then, or was; of those that met none,
+        the ones with such an object on the table.
+    unforeseen
+        Objects that were lifted, though no pose that was tried could.
+    """
+
+    objects: int = 0
+    attempts: int = 0
+    unforeseen: int = 0
+
+
+def could_be_lifted(attempts: Sequence[Attempt]) -> CouldBeLifted:
+    """Count what one policy could have lifted.
+
+    Parameters
+    ----------
+    attempts
+        All of the policy's, at any clutters.
+
+    Returns
+    -------
+    The counts; all 0 where ceilings were not looked for.
+    """
+    objects: set[tuple[str, int]] = set()
+    count = unforeseen = 0
+    for made in attempts:
+        if not made.HasField("ceilings_n"):
+            continue
+        borne_n, weight_n = from_tensor(made.ceilings_n).T
+        can = borne_n >= weight_n  # NaN, of what is gone, is not
+        objects |= {(made.scene_id, int(i) + 1) for i in np.flatnonzero(can)}
+        foreseen = bool(can[made.target_body - 1] if made.target_body else can.any())
+        lifted = made.outcome == "lifted"
+        if lifted:
+            objects.add((made.scene_id, made.target_body))
+        count += foreseen or lifted
+        unforeseen += lifted and not foreseen
+    return CouldBeLifted(len(objects), count, unforeseen)
 
 
 def _comparison(
@@ -189,4 +244,18 @@ def _figures(result: LevelResult) -> dict[str, object]:
         "success_at_first_seal": result.lifted_at_first_seal / max(result.attempts, 1),
         "seals_an_object": result.seals / result.lifted if result.lifted else None,
         "carried": dict(sorted(result.carried.items(), key=lambda one: float(one[0]))),
+        **_of_what_can_be_lifted(result),
+    }
+
+
+def _of_what_can_be_lifted(result: LevelResult) -> dict[str, object]:
+    """Against the ceiling; nothing where that was not looked for."""
+    if result.liftable == 0:
+        return {}
+    return {
+        "objects_that_can_be_lifted": result.liftable,
+        "lifted_of_these": result.lifted / result.liftable,
+        "attempts_at_these": result.attempts_at_liftable,
+        "success_at_these": result.lifted / max(result.attempts_at_liftable, 1),
+        "lifted_unforeseen": result.lifted_unforeseen,
     }

@@ -19,6 +19,7 @@ from pipeline.messages.objects import read_objects
 from pipeline.messages.proposed_contacts import worst_by_object
 from pipeline.messages.scenes import read_scenes
 from pipeline.recording import colours
+from pipeline.recording.pads import SealedPad, sealed_pad, show_pad, show_rings
 from pipeline.recording.proposed_contacts import (
     WORST,
     WORST_EACH,
@@ -41,9 +42,11 @@ from pipeline.recording.robot import (
     send_arm,
     send_poses,
     show_arm,
+    show_free_pad,
     show_gripper,
 )
 from pipeline.recording.shapes import shown_mesh, shown_pose
+from pipeline.referee.seal import Referee, referee_of
 from pipeline.spread import choose_evenly
 from schemas.softgrip.v1.evaluation_pb2 import Attempt, DepthPicture, ProposedContacts
 
@@ -72,8 +75,11 @@ def draw_evaluate(stage: FinishedStage, figures: Mapping[str, Any]) -> None:
     text = read_tables(stage.output)
     scale = stage.config.gripper.pad.radius_m / PadConfig().radius_m
     view = blueprint(stage.config.evaluate.robot == "iiwa14", scale)
+    pads = [sealed_pad(made, names[made.scene_id], meshes, stage.config) for made in shown]
+    referee = referee_of(stage.config.referee, stage.config.gripper.pad.radius_m)
     with recording(stage, view) as stream:
-        show_attempts(stream, shown, names, meshes, text, shown_robot(stage.config))
+        robot = shown_robot(stage.config)
+        show_attempts(stream, shown, names, meshes, text, robot, pads, referee)
         if analysis := figures.get("error_analysis"):
             worst = worst_by_object(contacts, stage.config.evaluate.split, WORST_EACH)
             show_worst(stream, worst, list(analysis["by_object"]))
@@ -133,6 +139,9 @@ def blueprint(with_arm: bool = False, scale: float = 1.0) -> rrb.Blueprint:
                 rrb.Tabs(
                     rrb.TextDocumentView(origin="/notes/result", name="Success"),
                     rrb.TextDocumentView(origin="/notes/errors", name="Errors"),
+                    rrb.TimeSeriesView(origin="/curves/load", name="Load and what is borne in N"),
+                    rrb.BarChartView(origin="/curves/vacuum", name="Vacuum by ring in Pa"),
+                    rrb.BarChartView(origin="/curves/gap", name="Gap by ring in mm, at most 5"),
                     rrb.TimeSeriesView(origin="/curves/state", name="State of the policy"),
                 ),
                 row_shares=[2, 3, 2, 2, 2],
@@ -151,6 +160,8 @@ def show_attempts(
     meshes: Mapping[str, Mesh],
     table: str,
     robot: ShownRobot,
+    pads: Sequence[SealedPad | None] = (),
+    referee: Referee | None = None,
 ) -> None:
     """Log the attempts one after the other as a film.
 
@@ -168,6 +179,10 @@ def show_attempts(
         The results as Markdown.
     robot
         Sizes of the robot.
+    pads
+        The sealed pad of each attempt, or None; none at all where nothing knows them.
+    referee
+        The pad's elements, and the fan; needed where there are sealed pads.
     """
     stream.log(
         "notes/result", rr.TextDocument(table, media_type=rr.MediaType.MARKDOWN), static=True
@@ -177,12 +192,16 @@ def show_attempts(
             curve, label = f"curves/{quantity}/{axis}", f"{axis} in {unit}"
             name_curve(stream, curve, label, colours.PALETTE[hue])
     name_curve(stream, "curves/state", ", ".join(STATES), colours.PALETTE[4])
+    name_curve(stream, "curves/load/hangs", "hangs on the pad in N", colours.PALETTE[6])
+    name_curve(stream, "curves/load/borne", "weight borne in N", colours.PALETTE[3])
+    frame = 0
+    set_step(stream, TIMELINE, frame)
     show_gripper(stream, robot)
     if any(made.HasField("joint_path") for made in attempts):
         show_arm(stream)
-    frame = 0
     for number, made in enumerate(attempts):
         set_step(stream, TIMELINE, frame)
+        show_free_pad(stream, robot)
         objects = start_path(stream, "world/objects", number)
         for index, name in enumerate(names[made.scene_id]):
             colour = colours.by_index(index + 1)
@@ -193,10 +212,40 @@ def show_attempts(
         if len(path):
             stream.log("world/path", rr.LineStrips3D([path[:, :3, 3]], radii=0.001))
             _show_motion(stream, objects, made, frame)
+            if number < len(pads) and referee is not None:
+                _show_seal(stream, number, made, pads[number], referee, frame)
             if made.HasField("joint_path"):
                 frames = frame + np.arange(len(path))
                 send_arm(stream, TIMELINE, frames, from_tensor(made.joint_path), robot)
         frame += len(path)
+
+
+def _show_seal(
+    stream: rr.RecordingStream,
+    number: int,
+    made: Attempt,
+    pad: SealedPad | None,
+    referee: Referee,
+    first: int,
+) -> None:
+    """From the last seal on: the pad as it lies, and what hangs on it beside what it bears."""
+    set_step(stream, TIMELINE, first)
+    path = start_path(stream, f"{GRIPPER}/sealed", number)
+    if pad is None:
+        return
+    set_step(stream, TIMELINE, first + pad.step)
+    stream.log(f"{GRIPPER}/pad", rr.Clear(recursive=True))
+    show_pad(stream, path, pad.seal, referee.disc, referee.fan.vacuum_pa)
+    show_rings(stream, pad.seal, referee.disc)
+    poses, wrench = from_tensor(made.gripper_path), from_tensor(made.base_wrench)
+    hangs_n = -np.einsum("tj,tj->t", poses[pad.step :, 2, :3], wrench[pad.step :, :3])
+    frames = first + np.arange(pad.step, len(poses))
+    for name, values in (("hangs", hangs_n), ("borne", np.full(len(frames), made.borne_n))):
+        stream.send_columns(
+            f"curves/load/{name}",
+            indexes=[rr.TimeColumn(TIMELINE, sequence=frames)],
+            columns=rr.Scalars.columns(scalars=values),
+        )
 
 
 def worst_first(attempts: Sequence[Attempt]) -> list[Attempt]:
@@ -279,5 +328,13 @@ def _facts(made: Attempt) -> str:
         f"reached q {made.reached_quality:.3f}, seal {made.seal_pressure:.3f}; "
         f"bears {made.borne_n:.2f} N, weighs {made.weight_n:.2f} N; "
         f"lifted {1e3 * made.lifted_height_m:.0f} mm in {made.duration_s:.1f} s, "
-        f"carried at up to {made.carried_m_s2:g} m/s²\n"
+        f"carried at up to {made.carried_m_s2:g} m/s²{_ceiling(made)}\n"
     )
+
+
+def _ceiling(made: Attempt) -> str:
+    """What the best pose bears of the target as it lay."""
+    if not made.HasField("ceilings_n") or not made.target_body:
+        return ""
+    borne_n = from_tensor(made.ceilings_n)[made.target_body - 1, 0]
+    return f"; the best pose bears {borne_n:.2f} N"

@@ -16,13 +16,13 @@ from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.transforms import invert
 from pipeline.recording import colours
+from pipeline.recording.pads import show_pad, show_rings
 from pipeline.recording.recording import eye_at, set_step, start_path, time_panel
 from pipeline.recording.shapes import shown_mesh, shown_pose
 from pipeline.referee.disc import Disc
 from pipeline.referee.seal import GRAVITY_M_S2, Seal
 
 TIMELINE = "grasp"
-LIFT_M = 3e-4  # the pad is drawn so far above what it lies on, as that is drawn simplified
 ARROW_M_PER_N = 0.003  # a closed fan on the whole pad, some 24 N, is drawn as long as the view
 NEAR_M = 0.15  # other objects are shown when their centres are this near
 VIEW = "Pad by the vacuum under it (dark 0, yellow a closed fan's), load borne and weight; in GCS"
@@ -149,7 +149,8 @@ def show_seals(
             stream.log(f"{path}/{index:02d}", shown_pose(pose))
         pad = start_path(stream, "world/pad", number)
         if one.seal is not None:
-            _show_pad(stream, pad, one.seal, disc, full_pa)
+            show_pad(stream, pad, one.seal, disc, full_pa)
+            show_rings(stream, one.seal, disc)
         arrows = start_path(stream, "world/loads", number)
         stream.log(
             arrows,
@@ -162,27 +163,6 @@ def show_seals(
             ),
         )
         stream.log("notes/grasp", rr.TextDocument(_facts(one), media_type="text/markdown"))
-
-
-def _show_pad(
-    stream: rr.RecordingStream, path: str, seal: Seal, disc: Disc, full_pa: float
-) -> None:
-    """The pad's face, and by ring its gap and the vacuum under it."""
-    vacuum = seal.vacuum.under_face_pa
-    stream.log(
-        path,
-        rr.Mesh3D(
-            vertex_positions=np.column_stack([disc.vertices_xy_m, seal.pressed.face_m + LIFT_M]),
-            triangle_indices=disc.triangles,
-            vertex_colors=colours.by_value(vacuum / full_pa),
-        ),
-    )
-    away = np.linalg.norm(disc.vertices_xy_m, axis=1)
-    _, ring = np.unique(np.round(away / disc.radius_m, 6), return_inverse=True)
-    gap_mm = np.minimum(seal.film_m * 1e3, 5.0)
-    counts = np.bincount(ring)
-    for name, values in (("vacuum", vacuum), ("gap", gap_mm)):
-        stream.log(f"curves/{name}", rr.BarChart(np.bincount(ring, values) / counts))
 
 
 def _facts(one: ShownSeal) -> str:

@@ -48,14 +48,15 @@ def results_markdown(
     rows = "\n".join(
         f"| {p.policy} | {_rate(p)} | {p.lifted} / {p.objects} | {p.cleared} / {p.clutters} "
         f"| {_at_first(p)} | {_seals_an_object(p)} | {p.seconds_a_pick:.1f} "
-        f"| {p.picks_an_hour:.0f} | {_carried(p)} |"
+        f"| {p.picks_an_hour:.0f} | {_carried(p)} | {_of_liftable(p)} |"
         for p in policies
     )
     parts.append(
         "### All levels\n\n"
         "| policy | success (95 % interval) | objects lifted | clutters cleared "
         "| success at the first seal | seals an object | seconds a pick | picks an hour "
-        f"| attempts that bore a transport |\n|-|-|-|-|-|-|-|-|-|\n{rows}\n"
+        "| attempts that bore a transport | lifted of what can be lifted "
+        f"|\n|-|-|-|-|-|-|-|-|-|-|\n{rows}\n"
     )
     if comparisons:
         parts.append(_comparison_table(comparisons))
@@ -114,6 +115,17 @@ def _seals_an_object(r: LevelResult) -> str:
 def _carried(r: LevelResult) -> str:
     found = sorted(r.carried.items(), key=lambda one: float(one[0]))
     return ", ".join(f"{count} at {level} m/s²" for level, count in found) or "none"
+
+
+def _of_liftable(r: LevelResult) -> str:
+    """Objects lifted over those that some pose lifts; and success of attempts at these."""
+    if r.liftable == 0:
+        return "not looked for"
+    attempts = max(r.attempts_at_liftable, 1)
+    return (
+        f"{r.lifted} / {r.liftable} ({100 * r.lifted / r.liftable:.0f} %), "
+        f"{100 * r.lifted / attempts:.0f} % of attempts at these"
+    )
 
 
 def _rate(r: LevelResult) -> str:

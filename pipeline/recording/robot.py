@@ -27,16 +27,7 @@ def show_gripper(stream: rr.RecordingStream, robot: ShownRobot) -> None:
     """Log the shapes of pad and stem in GCS; their pose is logged for each frame elsewhere."""
     hand = robot.hand
     stem_m = hand.length_m - hand.stem_begins_m
-    stream.log(
-        f"{GRIPPER}/pad",
-        rr.Cylinders3D(
-            lengths=[_PAD_M],
-            radii=[robot.pad_radius_m],
-            colors=[colours.PALETTE[6]],
-            fill_mode="solid",
-        ),
-        static=True,
-    )
+    show_free_pad(stream, robot)
     stream.log(
         f"{GRIPPER}/stem",
         rr.Cylinders3D(
@@ -47,6 +38,19 @@ def show_gripper(stream: rr.RecordingStream, robot: ShownRobot) -> None:
             fill_mode="solid",
         ),
         static=True,
+    )
+
+
+def show_free_pad(stream: rr.RecordingStream, robot: ShownRobot) -> None:
+    """Log the pad as a disc, as long as it lies on nothing."""
+    stream.log(
+        f"{GRIPPER}/pad",
+        rr.Cylinders3D(
+            lengths=[_PAD_M],
+            radii=[robot.pad_radius_m],
+            colors=[colours.PALETTE[6]],
+            fill_mode="solid",
+        ),
     )
 
 

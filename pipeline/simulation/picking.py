@@ -17,10 +17,12 @@ from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.gripper.pad import build_pad
 from pipeline.physics.engine import Body, add_body, new_world
 from pipeline.simulation.arm import ArmMover
+from pipeline.simulation.ceiling import Ceilings
 from pipeline.simulation.eyes import SimulatedEyes
 from pipeline.simulation.floating import FloatingMover, Mover
 from pipeline.simulation.gripper_body import SuctionGripper
 from pipeline.simulation.imperfection import WrenchSensor, draw_calibration
+from pipeline.simulation.judges import build_judge
 from pipeline.simulation.payload import GRAVITY_M_S2
 from pipeline.world.scene import ClutterScene
 
@@ -73,6 +75,9 @@ class Clutter:
         self.gripper = SuctionGripper(
             self.world, self.bodies, self.items, pad, config, mover, sensor
         )
+        self._ceilings = Ceilings(
+            self.items, pad, build_judge(config, pad), mover.reachable, config, scene.seed
+        )
         self.eyes = SimulatedEyes(self.gripper, self.items, config, calibration, rng)
 
     def make_attempt(
@@ -92,6 +97,7 @@ class Clutter:
         The attempt and how it ended.
         """
         self.gripper.begin()
+        ceilings_n = self._find_ceilings()
         eyes = LoggedEyes(self.eyes, lambda: len(self.gripper.samples) - 1)
         decision = Attempt(
             eyes,
@@ -102,7 +108,7 @@ class Clutter:
             self._rng,
             avoid_m,
         ).run()
-        made = self._judge(decision, eyes.seen)
+        made = self._judge(decision, eyes.seen, ceilings_n)
         lifted = {self.gripper.target} if made.cause is Cause.LIFTED else set()
         self.gripper.begin()
         for body_id in lifted:
@@ -112,7 +118,20 @@ class Clutter:
             self.world.remove_entity(self.bodies.pop(body_id).entity)
         return made
 
-    def _judge(self, decision: Decision, seen: list[SeenPicture]) -> JudgedAttempt:
+    def _find_ceilings(self) -> dict[int, tuple[float, float]]:
+        """What the best pose bears of each object as it lies, and its weight [N]."""
+        if self._config.evaluate.ceiling.poses == 0:
+            return {}
+        poses = {i: body.world_from_object for i, body in self.bodies.items()}
+        found = self._ceilings.update(poses, self.gripper.surfaces())
+        return {i: (best.borne_n, best.weight_n) for i, best in found.items()}
+
+    def _judge(
+        self,
+        decision: Decision,
+        seen: list[SeenPicture],
+        ceilings_n: dict[int, tuple[float, float]],
+    ) -> JudgedAttempt:
         """Correct the policy's own verdict by what physics shows, such as a low lift."""
         gripper, cause = self.gripper, decision.cause
         height = gripper.lifted_m()
@@ -135,6 +154,8 @@ class Clutter:
             reached_pose=gripper.reached_pose,
             samples=gripper.samples,
             seen=seen,
+            body_id=gripper.target,
+            ceilings_n=ceilings_n,
         )
 
     def _off_the_table(self) -> set[int]:

@@ -8,7 +8,7 @@ from typing import ClassVar as _ClassVar, Optional as _Optional, Union as _Union
 DESCRIPTOR: _descriptor.FileDescriptor
 
 class Attempt(_message.Message):
-    __slots__ = ("scene_id", "level", "attempt", "outcome", "cause", "target", "candidates", "predicted_quality", "reached_quality", "seal_pressure", "lifted_height_m", "duration_s", "world_from_gripper", "reached_pose", "time_s", "gripper_path", "object_paths", "base_wrench", "states", "policy", "candidate_poses", "candidate_quality", "corrections", "pictures", "regrasps", "joint_path", "seals", "carried_m_s2", "borne_n", "weight_n", "pressure", "seen", "contacts", "judge", "pad_radius_m")
+    __slots__ = ("scene_id", "level", "attempt", "outcome", "cause", "target", "candidates", "predicted_quality", "reached_quality", "seal_pressure", "lifted_height_m", "duration_s", "world_from_gripper", "reached_pose", "time_s", "gripper_path", "object_paths", "base_wrench", "states", "policy", "candidate_poses", "candidate_quality", "corrections", "pictures", "regrasps", "joint_path", "seals", "carried_m_s2", "borne_n", "weight_n", "pressure", "seen", "contacts", "judge", "pad_radius_m", "ceilings_n", "target_body")
     SCENE_ID_FIELD_NUMBER: _ClassVar[int]
     LEVEL_FIELD_NUMBER: _ClassVar[int]
     ATTEMPT_FIELD_NUMBER: _ClassVar[int]
@@ -44,6 +44,8 @@ class Attempt(_message.Message):
     CONTACTS_FIELD_NUMBER: _ClassVar[int]
     JUDGE_FIELD_NUMBER: _ClassVar[int]
     PAD_RADIUS_M_FIELD_NUMBER: _ClassVar[int]
+    CEILINGS_N_FIELD_NUMBER: _ClassVar[int]
+    TARGET_BODY_FIELD_NUMBER: _ClassVar[int]
     scene_id: str
     level: int
     attempt: int
@@ -79,7 +81,9 @@ class Attempt(_message.Message):
     contacts: _containers.RepeatedCompositeFieldContainer[TriedContact]
     judge: str
     pad_radius_m: float
-    def __init__(self, scene_id: _Optional[str] = ..., level: _Optional[int] = ..., attempt: _Optional[int] = ..., outcome: _Optional[str] = ..., cause: _Optional[str] = ..., target: _Optional[str] = ..., candidates: _Optional[int] = ..., predicted_quality: _Optional[float] = ..., reached_quality: _Optional[float] = ..., seal_pressure: _Optional[float] = ..., lifted_height_m: _Optional[float] = ..., duration_s: _Optional[float] = ..., world_from_gripper: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., reached_pose: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., time_s: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., gripper_path: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., object_paths: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., base_wrench: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., states: _Optional[_Iterable[str]] = ..., policy: _Optional[str] = ..., candidate_poses: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., candidate_quality: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., corrections: _Optional[int] = ..., pictures: _Optional[_Iterable[_Union[DepthPicture, _Mapping]]] = ..., regrasps: _Optional[int] = ..., joint_path: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., seals: _Optional[int] = ..., carried_m_s2: _Optional[float] = ..., borne_n: _Optional[float] = ..., weight_n: _Optional[float] = ..., pressure: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., seen: _Optional[_Iterable[_Union[DepthPicture, _Mapping]]] = ..., contacts: _Optional[_Iterable[_Union[TriedContact, _Mapping]]] = ..., judge: _Optional[str] = ..., pad_radius_m: _Optional[float] = ...) -> None: ...
+    ceilings_n: _tensor_pb2.Tensor
+    target_body: int
+    def __init__(self, scene_id: _Optional[str] = ..., level: _Optional[int] = ..., attempt: _Optional[int] = ..., outcome: _Optional[str] = ..., cause: _Optional[str] = ..., target: _Optional[str] = ..., candidates: _Optional[int] = ..., predicted_quality: _Optional[float] = ..., reached_quality: _Optional[float] = ..., seal_pressure: _Optional[float] = ..., lifted_height_m: _Optional[float] = ..., duration_s: _Optional[float] = ..., world_from_gripper: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., reached_pose: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., time_s: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., gripper_path: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., object_paths: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., base_wrench: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., states: _Optional[_Iterable[str]] = ..., policy: _Optional[str] = ..., candidate_poses: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., candidate_quality: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., corrections: _Optional[int] = ..., pictures: _Optional[_Iterable[_Union[DepthPicture, _Mapping]]] = ..., regrasps: _Optional[int] = ..., joint_path: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., seals: _Optional[int] = ..., carried_m_s2: _Optional[float] = ..., borne_n: _Optional[float] = ..., weight_n: _Optional[float] = ..., pressure: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., seen: _Optional[_Iterable[_Union[DepthPicture, _Mapping]]] = ..., contacts: _Optional[_Iterable[_Union[TriedContact, _Mapping]]] = ..., judge: _Optional[str] = ..., pad_radius_m: _Optional[float] = ..., ceilings_n: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., target_body: _Optional[int] = ...) -> None: ...
 
 class TriedContact(_message.Message):
     __slots__ = ("world_from_contact", "predicted_quality", "held", "lifted", "cloud", "cloud_mask", "pictures")
@@ -191,7 +195,7 @@ class DepthPicture(_message.Message):
     def __init__(self, camera: _Optional[str] = ..., depth_mm: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., intrinsics: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., world_from_camera: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., step: _Optional[int] = ..., left_px: _Optional[int] = ..., top_px: _Optional[int] = ..., whole_width_px: _Optional[int] = ..., whole_height_px: _Optional[int] = ...) -> None: ...
 
 class LevelResult(_message.Message):
-    __slots__ = ("level", "attempts", "lifted", "objects", "clutters", "cleared", "success_rate", "interval_low", "interval_high", "failures", "policy", "seconds_a_pick", "picks_an_hour", "seals", "lifted_at_first_seal", "carried", "imperfection_scale")
+    __slots__ = ("level", "attempts", "lifted", "objects", "clutters", "cleared", "success_rate", "interval_low", "interval_high", "failures", "policy", "seconds_a_pick", "picks_an_hour", "seals", "lifted_at_first_seal", "carried", "imperfection_scale", "liftable", "attempts_at_liftable", "lifted_unforeseen")
     class FailuresEntry(_message.Message):
         __slots__ = ("key", "value")
         KEY_FIELD_NUMBER: _ClassVar[int]
@@ -223,6 +227,9 @@ class LevelResult(_message.Message):
     LIFTED_AT_FIRST_SEAL_FIELD_NUMBER: _ClassVar[int]
     CARRIED_FIELD_NUMBER: _ClassVar[int]
     IMPERFECTION_SCALE_FIELD_NUMBER: _ClassVar[int]
+    LIFTABLE_FIELD_NUMBER: _ClassVar[int]
+    ATTEMPTS_AT_LIFTABLE_FIELD_NUMBER: _ClassVar[int]
+    LIFTED_UNFORESEEN_FIELD_NUMBER: _ClassVar[int]
     level: int
     attempts: int
     lifted: int
@@ -240,7 +247,10 @@ class LevelResult(_message.Message):
     lifted_at_first_seal: int
     carried: _containers.ScalarMap[str, int]
     imperfection_scale: float
-    def __init__(self, level: _Optional[int] = ..., attempts: _Optional[int] = ..., lifted: _Optional[int] = ..., objects: _Optional[int] = ..., clutters: _Optional[int] = ..., cleared: _Optional[int] = ..., success_rate: _Optional[float] = ..., interval_low: _Optional[float] = ..., interval_high: _Optional[float] = ..., failures: _Optional[_Mapping[str, int]] = ..., policy: _Optional[str] = ..., seconds_a_pick: _Optional[float] = ..., picks_an_hour: _Optional[float] = ..., seals: _Optional[int] = ..., lifted_at_first_seal: _Optional[int] = ..., carried: _Optional[_Mapping[str, int]] = ..., imperfection_scale: _Optional[float] = ...) -> None: ...
+    liftable: int
+    attempts_at_liftable: int
+    lifted_unforeseen: int
+    def __init__(self, level: _Optional[int] = ..., attempts: _Optional[int] = ..., lifted: _Optional[int] = ..., objects: _Optional[int] = ..., clutters: _Optional[int] = ..., cleared: _Optional[int] = ..., success_rate: _Optional[float] = ..., interval_low: _Optional[float] = ..., interval_high: _Optional[float] = ..., failures: _Optional[_Mapping[str, int]] = ..., policy: _Optional[str] = ..., seconds_a_pick: _Optional[float] = ..., picks_an_hour: _Optional[float] = ..., seals: _Optional[int] = ..., lifted_at_first_seal: _Optional[int] = ..., carried: _Optional[_Mapping[str, int]] = ..., imperfection_scale: _Optional[float] = ..., liftable: _Optional[int] = ..., attempts_at_liftable: _Optional[int] = ..., lifted_unforeseen: _Optional[int] = ...) -> None: ...
 
 class Comparison(_message.Message):
     __slots__ = ("policy", "baseline", "clutters", "success_rate", "baseline_success_rate", "p_paired", "p_fisher")
