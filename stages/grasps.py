@@ -28,7 +28,7 @@ from pipeline.execution.items import GRASP_COUNTS, item_key, items_basis
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.labelling.balancing import quality_histogram
 from pipeline.labelling.grasps import LabelledGrasps
-from pipeline.labelling.scene import label_scene, scene_surfaces
+from pipeline.labelling.scene import label_scene, noise_draws, scene_surfaces
 from pipeline.labelling.shown_pads import SHOWN_SCENES, ShownPads, drape_again
 from pipeline.messages.grasps import PADS_TOPIC, pads_message, read_grasps, write_grasps
 from pipeline.messages.objects import read_objects
@@ -97,7 +97,7 @@ def build(stage: StageContext) -> Summary:
     stage.drawing.seconds += sum(result.recording_s for result in results)
     entries = [shard_entry(r.shard, stage.output.parent, len(r.quality), r.split) for r in results]
     write_index(stage.output, stage.provenance(), entries, quality_histogram(quality))
-    return summary(results, quality)
+    return summary(results, quality, stage.config)
 
 
 def synthesize_shard(job: ShardJob) -> ShardResult:
@@ -149,13 +149,14 @@ def examined(shard: Path) -> ShardResult:
     return ShardResult(shard, split, np.concatenate(quality), tuple(sorted(names)), dict(status))
 
 
-def summary(results: list[ShardResult], quality: np.ndarray) -> Summary:
+def summary(results: list[ShardResult], quality: np.ndarray, config: RunConfig) -> Summary:
     """The stage's headline figures."""
     status: Counter[str] = Counter()
     for result in results:
         status.update(result.status)
     return {
-        "grasps": len(quality),
+        "grasps": sum(len(r.quality) // noise_draws(r.split, config) for r in results),
+        "clouds": len(quality),
         "quality_histogram": quality_histogram(quality).tolist(),
         "status": dict(sorted(status.items())),
         "objects": len({name for result in results for name in result.object_names}),

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 
 from loguru import logger
@@ -21,6 +21,7 @@ from pipeline.execution import (
     stage_command,
 )
 from pipeline.execution.items import with_object_keys
+from pipeline.execution.left_out import LeftOut
 from pipeline.geometry.catalogue import CatalogueObject, MeasuredObject
 from pipeline.geometry.families import DeclaredFamily, read_declared
 from pipeline.geometry.intake import (
@@ -32,15 +33,18 @@ from pipeline.geometry.intake import (
 from pipeline.geometry.masses import mass_of, read_masses
 from pipeline.geometry.mesh_folders import FAMILIES_FILE, MASSES_FILE
 from pipeline.geometry.plan import Plan, plan_catalogue
+from pipeline.geometry.random_solids.catalogued import (
+    solid_names,
+    solid_or_why_not,
+    solids_for_training,
+)
 from pipeline.geometry.selection import Split
 from pipeline.geometry.settled import SETTLED_FILE, read_settled
 from pipeline.geometry.stretching import stretched_for_training
-from pipeline.messages.objects import REFUSED_TOPIC, TOPIC, object_message, refused_message
+from pipeline.messages.objects import REFUSED_TOPIC, TOPIC, object_message
 from pipeline.recording.objects import draw_objects
 from schemas.softgrip.v1.objects_pb2 import RefusedMesh
 from stages.graph import OBJECTS, inputs_of
-
-TRIED_AGAIN = "It is tried again next time; mend it, or take it out of the folder"
 
 
 def build(stage: StageContext) -> Summary:
@@ -60,35 +64,22 @@ def build(stage: StageContext) -> Summary:
     with Isolation(stage.workers, most, stage.executor) as apart:
         measured = measure(stage, jobs, apart, left_out)
         plan, objects = finish(stage, measured, planned, apart, left_out)
+        solids = random_solids(stage, plan, apart, left_out)
     for source, why in plan.left_out:
         left_out.add(source, why)
     rng_of = partial(generator, seed, "object")
     threshold = stage.config.split.family_threshold
+    solids, solids_near = solids_for_training(solids, plan, threshold)
+    objects += solids
     stretched, near = stretched_for_training(objects, plan, config, rng_of, threshold)
     objects += stretched
-    split = plan.split | dict.fromkeys((item.name for item in stretched), "train")
+    split = dict.fromkeys((item.name for item in objects), "train") | plan.split
     publish_bytes(settled_in, plan.settled.to_json().encode())
     for remark in plan.remarks:
         logger.warning("{}", remark)
     publish(stage, objects, split, left_out)
-    figures = {"stretched_near_held_out": near, **plan.figures}
+    figures = {"stretched_near_held_out": near, "solids_near_held_out": solids_near, **plan.figures}
     return summary(objects, split, left_out.refused) | figures
-
-
-@dataclass
-class LeftOut:
-    """Meshes that did not become objects, as records, and which of them a process was lost to."""
-
-    refused: list[RefusedMesh] = field(default_factory=list)
-    cut_short: list[str] = field(default_factory=list)
-
-    def add(self, source: str, why: MeshError | Lost) -> None:
-        """Record a mesh that is left out, and tell the reader."""
-        if isinstance(why, Lost):
-            self.cut_short.append(source)
-            why = MeshError(f"{source} {why.how}", TRIED_AGAIN)
-        logger.warning("left out: {}", why)
-        self.refused.append(refused_message(source, why))
 
 
 def settling_basis(stage: StageContext) -> str:
@@ -114,13 +105,19 @@ def measure(
     """Load, repair and measure every source; what is refused is named, the others go on."""
     job = partial(measured_or_why_not, config=stage.config.objects, folder=stage.mesh_dir)
     shown = progress(apart.run_in_order(job, jobs), len(jobs), "objects: repair and NSVR", "mesh")
-    measured = []
-    for (_, name), result in zip(jobs, shown, strict=True):
-        if isinstance(result, MeshError | Lost):
-            left_out.add(name, result)
-        else:
-            measured.append(result)
-    return measured
+    return left_out.sifted([name for _, name in jobs], shown)
+
+
+def random_solids(
+    stage: StageContext, plan: Plan, apart: Isolation, left_out: LeftOut
+) -> list[CatalogueObject]:
+    """Solids drawn from the seed; their shapes are nobody's."""
+    config, cache = stage.config.objects, stage.folder.cache / "convex_parts"
+    names = solid_names(config.random_solids, plan.measured)
+    job = partial(solid_or_why_not, config=config, cache=cache)
+    results = apart.run_in_order(job, [(n, generator(stage.config.seed, n)) for n in names])
+    shown = progress(results, len(names), "objects: random solids", "solid")
+    return left_out.sifted(names, shown)
 
 
 def finish(

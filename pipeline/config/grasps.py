@@ -125,6 +125,13 @@ class GraspsConfig(ScaledSection):
         description="share of clouds cut from all pictures of the scene, as the global phase does; "
         "the others from one, as on the way down [1]",
     )
+    noise_draws: int = Field(
+        1,
+        ge=1,
+        le=64,
+        description="clouds measured of each training grasp: the same label under further draws of "
+        "the sensors' noise",
+    )
     samples_per_message: int = Field(256, ge=1, le=8192)
 
 

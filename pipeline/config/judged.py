@@ -18,6 +18,7 @@ def judged_config(config: RunConfig) -> RunConfig:
     alone = {
         "limit": 0,
         "embedded_in_training": False,
+        "random_solids": 0,
         "stretched_copies": 0,
         "masses": masses,
     }
@@ -31,7 +32,9 @@ def judged_config(config: RunConfig) -> RunConfig:
             "objects": config.objects.model_copy(update=alone),
             "split": config.split.model_copy(update={"families": families}),
             "scenes": config.scenes.model_copy(update=scenes),
-            "grasps": config.grasps.model_copy(update={"count": config.agreement.labelled}),
+            "grasps": config.grasps.model_copy(
+                update={"count": config.agreement.labelled, "noise_draws": 1}
+            ),
         }
     )
 
@@ -49,6 +52,7 @@ def holdout_config(config: RunConfig) -> RunConfig:
                 update={
                     "limit": 0,
                     "embedded_in_training": False,
+                    "random_solids": 0,
                     "stretched_copies": 0,
                     "transparent": (),
                     "masses": "",
@@ -75,13 +79,13 @@ def holdout_config(config: RunConfig) -> RunConfig:
 def folds_config(config: RunConfig, folds: int) -> RunConfig:
     """A run's configuration for each of so many folds: all its objects make clutters of one split.
 
-    Labels are dealt over the folds. Stretched copies are left out.
+    Labels are dealt over the folds. Random solids and stretched copies are left out.
     """
     wanted = config.folds
     families, masses = (
         f"../{name}" if name else "" for name in (config.split.families, config.objects.masses)
     )  # beside the run's own run.toml
-    dealt = {"limit": 0, "stretched_copies": 0, "masses": masses}
+    dealt = {"limit": 0, "random_solids": 0, "stretched_copies": 0, "masses": masses}
     return config.model_copy(
         update={
             "objects": config.objects.model_copy(update=dealt),

@@ -51,6 +51,9 @@ class ObjectsConfig(ScaledSection):
     copies_rms: float = Field(
         2e-3, ge=0, le=0.1, description="surfaces nearer than this are one, rms over sqrt(A) [1]"
     )
+    random_solids: int = Field(
+        0, ge=0, le=9999, description="further shapes for training: solids drawn from the seed"
+    )
     stretched_copies: int = Field(
         0, ge=0, le=100, description="further shapes made of each training object by stretching it"
     )

@@ -23,7 +23,7 @@ def stretched_for_training(
     Parameters
     ----------
     items
-        The catalogue's objects.
+        The catalogue's objects; those that the plan does not know are for training.
     plan
         Which of them are for training, and which are held out.
     config
@@ -43,7 +43,7 @@ def stretched_for_training(
     MeshError
         A copy would have the name of an object.
     """
-    training = [item for item in items if plan.split[item.name] == "train"]
+    training = [item for item in items if plan.split.get(item.name, "train") == "train"]
     copies = stretched_copies(training, plan.measured, config, rng_of)
     held_out = {name: item.descriptor for name, item in plan.held_out.items()}
     near = near_held_out(copies, held_out, threshold)

@@ -68,7 +68,9 @@ def label_scene(
 
     Returns
     -------
-    A batch of kept grasps for each viewpoint that sees at least one possible contact.
+    A batch of kept grasps for each viewpoint that sees at least one possible contact, in training
+    scenes ``grasps.noise_draws`` times: with the noise of the scene's pictures, then with pictures
+    of its own.
 
     Raises
     ------
@@ -76,7 +78,8 @@ def label_scene(
         No camera sees a surface face on and whole in its picture.
     """
     names = tuple(sorted({item.object_name for item in scene.objects}))
-    measured = measure_pictures(scene.views, config.sensing.disturbed, rng)
+    disturbed = config.sensing.disturbed
+    measured = measure_pictures(scene.views, disturbed, rng)
     seen = [visible_surface(view, surfaces, config.gripper.pad.radius_m) for view in scene.views]
     able = [
         number
@@ -91,13 +94,21 @@ def label_scene(
     index_of_body = np.zeros(1 + max(item.body_id for item in scene.objects), dtype=np.int64)
     for item in scene.objects:
         index_of_body[item.body_id] = names.index(item.object_name)
+    draws = noise_draws(scene.split, config)
     batches = []
     for number, share in zip(able, split_evenly(wanted, len(able)), strict=True):
         kept = sample_grasps(seen[number], surfaces, config, share, rng)
-        grasps = add_clouds(kept, measured[number], measured, config, rng)
         origin = grasp_origin(scene, scene.views[number].camera.name, names)
-        batches.append((origin, replace(grasps, object_index=index_of_body[grasps.body_id])))
+        for draw in range(draws):
+            shown = measured if draw == 0 else measure_pictures(scene.views, disturbed, rng)
+            grasps = add_clouds(kept, shown[number], shown, config, rng)
+            batches.append((origin, replace(grasps, object_index=index_of_body[grasps.body_id])))
     return batches
+
+
+def noise_draws(split: str, config: RunConfig) -> int:
+    """Clouds that are measured of each grasp in a scene of this split."""
+    return config.grasps.noise_draws if split == "train" else 1
 
 
 def visible_surface(view: CameraView, surfaces: Surfaces, radius_m: float) -> VisibleSurface:

@@ -11,6 +11,7 @@ import trimesh
 from pipeline.artifacts import open_artifact
 from pipeline.errors import MeshError
 from pipeline.execution import Allowance, Isolation, Lost, RunFolder, StageContext
+from pipeline.execution.left_out import LeftOut
 from pipeline.execution.staleness import artifact_is_fresh, stage_context, why_stale
 from pipeline.geometry.plan import plan_catalogue
 from pipeline.geometry.settled import SETTLED_FILE, read_settled
@@ -99,7 +100,7 @@ def test_an_object_lost_while_it_is_cut_is_as_if_it_had_never_been_there(
     before = {name: where for name, (_, where) in read_objects(stage.output).items()}
     lost = sorted(before)[1]
     with Isolation(1, Allowance(60, 1024)) as apart:
-        measured = objects.measure(stage, objects.sources(stage)[0], apart, objects.LeftOut())
+        measured = objects.measure(stage, objects.sources(stage)[0], apart, LeftOut())
     settled = read_settled(stage.folder.state(SETTLED_FILE), objects.settling_basis(stage))
     planned = partial(
         plan_catalogue,
@@ -109,7 +110,7 @@ def test_an_object_lost_while_it_is_cut_is_as_if_it_had_never_been_there(
         seed=stage.config.seed,
         settled=settled,
     )
-    left_out = objects.LeftOut()
+    left_out = LeftOut()
     plan, made = objects.finish(stage, measured, planned, Losing({lost}), left_out)
     assert left_out.cut_short == [f"{lost}.ply"]
     assert len(made) == 5

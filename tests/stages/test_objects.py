@@ -1,16 +1,23 @@
 """Which objects a catalogue takes: meshes, embedded objects, and both."""
 
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 import trimesh
 from rerun.chunk import RrdReader
 
 from pipeline.errors import ConfigError, MeshError
-from pipeline.execution import RunFolder, StageContext
+from pipeline.execution import Allowance, Isolation, RunFolder, StageContext
+from pipeline.execution.left_out import LeftOut
 from pipeline.execution.staleness import stage_context
 from pipeline.geometry import intake
+from pipeline.geometry.catalogue import prepare_object
 from pipeline.geometry.parametric import PARAMETRIC_OBJECTS
+from pipeline.geometry.plan import plan_catalogue
+from pipeline.geometry.random_solids.catalogued import solids_for_training
+from pipeline.geometry.settled import Settled
 from pipeline.messages.objects import read_objects
 from pipeline.recording.objects import draw_objects
 from stages import objects
@@ -72,6 +79,41 @@ def test_training_objects_alone_are_stretched_into_further_shapes(
     assert len(found) == 7 + len(copies) == made["objects"]
     assert not any("-stretched-" in n for n, (_, where) in found.items() if where != "train")
     assert len({tuple(found[name][0].mesh.extents_m) for name in training}) == len(training)
+
+
+def test_random_solids_are_for_training_and_each_is_a_family_of_its_own(
+    tmp_path: Path, mesh_dir: Path
+) -> None:
+    config = "[objects]\nlimit = 3\nrandom_solids = 1\nstretched_copies = 1\n"
+    stage = context(tmp_path, mesh_dir, config + "[objects.convex]\ninput_faces = 200\n")
+    made = objects.build(stage)
+    found = read_objects(stage.output)
+    solids = {name: found[name] for name in found if name.startswith("random-solid-")}
+    assert set(solids) == {"random-solid-0001", "random-solid-0001-stretched-1"}
+    assert made["solids_near_held_out"] == {}
+    assert {where for _, where in solids.values()} == {"train"}
+    assert solids["random-solid-0001-stretched-1"][0].family == "random-solid-0001"
+    bounds = stage.config.objects
+    for item, _ in solids.values():
+        assert item.mesh.extents_m.max() >= bounds.target_extent_min_m * (1 - 1e-9)
+        assert item.mesh.extents_m.max() <= bounds.target_extent_max_m * (1 + 1e-9)
+
+
+def test_a_solid_like_a_held_out_object_is_left_out_and_one_like_a_training_object_joins_it(
+    tmp_path: Path, mesh_dir: Path
+) -> None:
+    stage = context(tmp_path, mesh_dir, "[objects.convex]\ninput_faces = 200\n")
+    configs = (stage.config.objects, stage.config.split)
+    with Isolation(1, Allowance(60, 1024)) as apart:
+        measured = objects.measure(stage, objects.sources(stage)[0], apart, LeftOut())
+    plan = plan_catalogue(measured, frozenset(), (), configs, 0, Settled(""))
+    shape = prepare_object(measured[0].source, configs[0], np.random.default_rng(0), tmp_path)
+    of = {where: name for name, where in plan.split.items()}
+    solids = [replace(shape, name=w, mesh=plan.measured[n].mesh) for w, n in of.items()]
+    kept, near = solids_for_training(solids, plan, 1e-3)
+    assert [item.name for item in kept] == ["train"]
+    assert kept[0].family == plan.families.of[of["train"]]
+    assert near == {"val": of["val"], "test": of["test"]}
 
 
 def test_a_mesh_of_a_copys_name_is_an_error(tmp_path: Path, mesh_dir: Path) -> None:

@@ -1,0 +1,65 @@
+"""Solids without end, from a seed: training shapes that no folder has and nobody drew."""
+
+import numpy as np
+
+from pipeline.errors import MeshError
+from pipeline.geometry.manifolds import from_manifold
+from pipeline.geometry.mesh import Mesh
+from pipeline.geometry.parametric.solids import Solid
+from pipeline.geometry.random_solids.bodies import KINDS
+from pipeline.geometry.random_solids.skins import bent_and_rough, mark
+from pipeline.geometry.shape import mean_thickness
+
+# Edges are split so that the shortest waves of a skin show: 8 mm.
+_EDGE_M = 0.004
+_MARKED_SHARE = 0.45
+_LEAST_THICKNESS = 0.01  # 2 V / A over the longest extent: a cup with a wall of 1 mm
+_MOST_FACES = 40_000  # a scan has 16 000; more is fine ribs that no camera sees
+_MOST_DRAWS = 50
+
+
+def random_solid(rng: np.random.Generator) -> Mesh:
+    """A closed mesh of one body, some 0.1 m long; the same for the same stream.
+
+    Parameters
+    ----------
+    rng
+        Draws everything: the kind of body, its marks, its skin.
+
+    Returns
+    -------
+    The mesh [m].
+
+    Raises
+    ------
+    MeshError
+        None of 50 draws is a body of some thickness: the stream is no random one.
+    """
+    builders, shares = zip(*KINDS.values(), strict=True)
+    for _ in range(_MOST_DRAWS):
+        body = builders[rng.choice(len(builders), p=shares)](rng)
+        if rng.random() < _MARKED_SHARE:
+            body = mark(body, rng)
+        mesh = _surface(body, rng)
+        if mesh is not None:
+            return mesh
+    raise MeshError("No random solid came out", "Draw it with another seed")
+
+
+def _surface(body: Solid, rng: np.random.Generator) -> Mesh | None:
+    """The largest piece, its edges split and its skin warped; None for a sheet or a sieve."""
+    pieces = body.decompose()
+    if not pieces:
+        return None
+    largest = max(pieces, key=lambda piece: piece.volume())
+    longest = float(np.subtract(largest.bounding_box()[3:], largest.bounding_box()[:3]).max())
+    if longest <= 0:
+        return None
+    sized = largest.scale(tuple([0.12 / longest] * 3)).refine_to_length(_EDGE_M)
+    if sized.num_tri() > _MOST_FACES:
+        return None
+    mesh = from_manifold(sized)
+    mesh = Mesh(bent_and_rough(np.array(mesh.vertices_m), rng), mesh.faces)
+    if mean_thickness(mesh) < _LEAST_THICKNESS * float(mesh.extents_m.max()):
+        return None
+    return mesh

@@ -1,0 +1,80 @@
+"""Random solids are closed, of one body, of every class, and follow from their stream alone."""
+
+from collections import Counter
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pipeline.errors import MeshError
+from pipeline.geometry.mesh import Mesh
+from pipeline.geometry.random_solids import random_solid
+from pipeline.geometry.random_solids.bodies import KINDS
+from pipeline.geometry.random_solids.catalogued import solid_names
+from pipeline.geometry.random_solids.skins import mark, warp
+from pipeline.geometry.shape import nsvr, shape_class, volume
+from pipeline.geometry.topology import components, is_closed
+
+DRAWN = 40
+
+
+@lru_cache
+def solid(number: int) -> Mesh:
+    return random_solid(np.random.default_rng([11, number]))
+
+
+@pytest.mark.parametrize("number", range(DRAWN))
+def test_each_is_one_closed_body(number: int) -> None:
+    mesh = solid(number)
+    assert is_closed(mesh)
+    assert len(components(mesh.faces)) == 1
+    assert volume(mesh) > 0
+    assert 0.08 < mesh.extents_m.max() < 0.18
+
+
+def test_the_same_stream_draws_the_same_bytes_and_another_one_does_not() -> None:
+    again = random_solid(np.random.default_rng([11, 0]))
+    assert again.vertices_m.tobytes() == solid(0).vertices_m.tobytes()
+    assert again.faces.tobytes() == solid(0).faces.tobytes()
+    assert again.vertices_m.tobytes() != solid(1).vertices_m.tobytes()
+
+
+def test_every_class_has_its_share() -> None:
+    classes = Counter(shape_class(nsvr(solid(number))) for number in range(DRAWN))
+    assert len(classes) == 3
+    assert min(classes.values()) >= DRAWN // 8
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_each_kind_is_a_solid_and_a_mark_changes_it(kind: str) -> None:
+    rng = np.random.default_rng(3)
+    body = KINDS[kind][0](rng)
+    assert body.volume() > 0
+    assert mark(body, rng).volume() not in (0, body.volume())
+
+
+def test_shares_of_the_kinds_are_all() -> None:
+    assert sum(share for _, share in KINDS.values()) == pytest.approx(1)
+
+
+@settings(deadline=None, max_examples=30)
+@given(seed=st.integers(0, 2**32 - 1), slope=st.floats(0.01, 0.6), apart=st.floats(1e-6, 0.05))
+def test_a_warp_brings_no_two_points_nearer_than_its_slope_says(
+    seed: int, slope: float, apart: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    points = rng.uniform(-0.1, 0.1, (50, 3))
+    step = rng.normal(size=points.shape)
+    others = points + apart * step / np.linalg.norm(step, axis=1)[:, None]
+    moved = warp(np.vstack([points, others]), (0.008, 0.05), slope, np.random.default_rng(seed))
+    after = np.linalg.norm(moved[:50] - moved[50:], axis=1)
+    assert np.all(after >= (1 - slope) * apart * (1 - 1e-6))
+    assert np.all(after <= (1 + slope) * apart * (1 + 1e-6))
+
+
+def test_more_solids_leave_the_first_their_names_and_no_mesh_may_have_one() -> None:
+    assert solid_names(5, ())[:3] == solid_names(3, ())
+    with pytest.raises(MeshError, match="random-solid-0002"):
+        solid_names(2, ["random-solid-0002"])
