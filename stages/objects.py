@@ -73,7 +73,8 @@ def build(stage: StageContext) -> Summary:
     objects += solids
     stretched, near = stretched_for_training(objects, plan, config, rng_of, threshold)
     objects += stretched
-    split = dict.fromkeys((item.name for item in objects), "train") | plan.split
+    split: dict[str, Split] = dict.fromkeys((item.name for item in objects), "train")
+    split |= plan.split
     publish_bytes(settled_in, plan.settled.to_json().encode())
     for remark in plan.remarks:
         logger.warning("{}", remark)
