@@ -7,6 +7,7 @@ from pipeline.config import load_run_config
 from pipeline.errors import ConfigError
 from pipeline.execution.stage import RunFolder, Stage
 from pipeline.geometry.mesh_folders import FAMILIES_FILE, MASSES_FILE, list_mesh_files
+from pipeline.network.released_files import CHECKPOINT_FILE, RELEASED, RELEASED_FOLDER
 
 OBJECTS = Stage(
     "objects", ("seed", "objects", "split"), shown=("recording.objects",), drawn_apart=True
@@ -62,6 +63,7 @@ RUNS_DIR = Path("runs")
 # A network in a run's folder that stands in the place of one trained there; `make holdout`.
 GIVEN_NETWORK = "network.onnx"
 ATTEMPTS = "attempts/"  # before the number of each input that ``train.attempts`` names
+STARTING_NETWORK = "start.safetensors"  # the input that ``train.start`` names
 
 
 def inputs_of(stage: Stage, folder: RunFolder, mesh_dir: Path | None) -> dict[str, Path]:
@@ -84,7 +86,20 @@ def inputs_of(stage: Stage, folder: RunFolder, mesh_dir: Path | None) -> dict[st
     if stage is TRAIN:
         logged = [folder.path / one for one in load_run_config(folder.config).train.attempts]
         inputs |= {f"{ATTEMPTS}{n}": path for n, path in enumerate(artifacts_in(logged))}
+    if stage is TRAIN and (named := load_run_config(folder.config).train.start):
+        inputs[STARTING_NETWORK] = starting_file(folder, named)
     return inputs
+
+
+def starting_file(folder: RunFolder, named: str) -> Path:
+    """The file that ``train.start`` names: the released network's, or one beside run.toml."""
+    path = RELEASED_FOLDER / CHECKPOINT_FILE if named == RELEASED else folder.path / named
+    if not path.is_file():
+        raise ConfigError(
+            f"{path} is missing, and train.start names it",
+            f"Put a {CHECKPOINT_FILE} there, or write train.start = '{RELEASED}'",
+        )
+    return path
 
 
 def told_of_objects(

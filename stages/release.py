@@ -20,18 +20,21 @@ from pipeline.messages.training import CHECKPOINT, EXPORT
 from pipeline.network.by_object import errors_by_object, macro_error
 from pipeline.network.control_inference import ControlPredictor
 from pipeline.network.figures import mean_absolute_error, weighted_error
+from pipeline.network.fine_tuning import grasps_to_bytes
 from pipeline.network.fitted_baselines import baseline_errors, fit_baselines
-from pipeline.network.sources import (
+from pipeline.network.released_files import (
     BASELINE_FILE,
     DIGESTS_FILE,
+    FIGURES_FILE,
     RELEASED_FOLDER,
-    baseline_to_json,
-    sha256_of,
+    TEST_GRASPS_FILE,
 )
+from pipeline.network.sources import baseline_to_json, sha256_of
+from pipeline.spread import choose_evenly
 from stages.graph import RUNS_DIR
 from stages.shards import gather
 
-FIGURES_FILE = "figures.json"
+TEST_GRASPS = 600  # 2 MiB: on which a fine-tuned network shows what it forgot
 FITTED = 4000  # training samples that the baselines are fitted to, as for the first release
 
 
@@ -70,10 +73,12 @@ def release(
         "best_constant_mae": float(np.abs(quality - np.median(quality)).mean()),
         "by_object": {one.name: one.figures() for one in errors},
     }
+    some = test_set.take(np.array(choose_evenly(len(test_set), TEST_GRASPS)))
     files = {
         EXPORT: (trained / EXPORT).read_bytes(),
         CHECKPOINT: (trained / CHECKPOINT).read_bytes(),
         BASELINE_FILE: baseline_to_json(fitted.analytic).encode(),
+        TEST_GRASPS_FILE: grasps_to_bytes(some.cloud, some.cloud_mask, some.quality),
         FIGURES_FILE: (json.dumps(figures, indent=1) + "\n").encode(),
     }
     for name, data in files.items():

@@ -24,6 +24,7 @@ from pipeline.messages.training import (
 from pipeline.network.checkpoint import save_checkpoint_bytes
 from pipeline.network.control_inference import ControlPredictor, check_export
 from pipeline.network.export import export_onnx_bytes
+from pipeline.network.fine_tuning import measure_fine_tuning, starting_network
 from pipeline.network.fitted_baselines import fit_baselines
 from pipeline.network.ga_cnn import parameter_count
 from pipeline.network.held_out import TestFigures, measure_held_out
@@ -35,7 +36,8 @@ from pipeline.network.sources import baseline_to_json
 from pipeline.network.timing import runtimes_ms_a_grasp
 from pipeline.network.training import TrainedNetwork, choose_device, train
 from pipeline.recording.train import draw_train
-from stages.graph import ATTEMPTS, TRAIN, inputs_of
+from schemas.softgrip.v1.training_pb2 import TrainingResult
+from stages.graph import ATTEMPTS, STARTING_NETWORK, TRAIN, inputs_of
 
 COMPARED = 512  # test clouds on which the export for control is held against its original
 SAMPLES = "samples"  # folder of the decoded shards, in the run's state
@@ -45,6 +47,8 @@ def build(stage: StageContext, ranks: Ranks = ALONE) -> Summary:
     """Train GA-CNN on the train split, stop by the val split, report on the test split."""
     config = stage.config
     train_set, val_set, test_set = (split_of(stage, name) for name in ("train", "val", "test"))
+    begun = stage.inputs.get(STARTING_NETWORK)
+    start = starting_network(begun.read_bytes(), str(begun), config.network) if begun else None
     on_gpu = choose_device(config.train.device, ranks).type == "cuda"
     trained = train(
         config.train,
@@ -58,11 +62,17 @@ def build(stage: StageContext, ranks: Ranks = ALONE) -> Summary:
         # On a CPU readers would take the cores that train.
         loader_workers=max(stage.workers // ranks.count, 1) if on_gpu else 0,
         show_progress=True,
+        start=start,
     )
     if not ranks.first:
         return {}
     fitted = fit_baselines(train_set, config.gripper, config.train.baseline_samples)
     figures = measure_held_out(trained.network, config.train, fitted, train_set, val_set, test_set)
+    tuned = (
+        measure_fine_tuning(start, trained.network, config.train, test_set.tensors)
+        if start
+        else None
+    )
     exported = export_for_control(stage, trained, test_set)
     checkpoint = save_checkpoint_bytes(trained.network)
     attached = {
@@ -72,7 +82,7 @@ def build(stage: StageContext, ranks: Ranks = ALONE) -> Summary:
     }
     for name, data in attached.items():
         publish_bytes(stage.folder.path / "train" / name, data)
-    write(stage, trained, figures, attached)
+    write(stage, trained, result_message(trained, figures, tuned), attached)
     inference = runtimes_ms_a_grasp(
         trained.network,
         ControlPredictor(exported, config.train.threads),
@@ -80,7 +90,8 @@ def build(stage: StageContext, ranks: Ranks = ALONE) -> Summary:
         test_set.cloud_mask,
         config.train.threads,
     )
-    return summary(stage, trained, figures, ranks) | {"inference_ms_a_grasp": inference}
+    told = tuned.headline() if tuned else {}
+    return summary(stage, trained, figures, ranks) | told | {"inference_ms_a_grasp": inference}
 
 
 def split_of(stage: StageContext, split: str) -> Samples:
@@ -136,14 +147,13 @@ def export_for_control(stage: StageContext, trained: TrainedNetwork, test_set: S
 def write(
     stage: StageContext,
     trained: TrainedNetwork,
-    figures: TestFigures,
+    result: TrainingResult,
     attached: Mapping[str, bytes],
 ) -> None:
     """The artifact, which carries curve, figures, weights and the fitted baseline."""
     with ArtifactWriter(stage.output, stage.provenance()) as artifact:
         for epoch in trained.history:
             artifact.write("/epochs", epoch_message(epoch), log_time_ns=epoch.epoch)
-        result = result_message(trained, figures)
         artifact.write("/result", result, log_time_ns=len(trained.history))
         for name, data in attached.items():
             artifact.attach(name, "application/octet-stream", data)

@@ -7,12 +7,14 @@ import numpy as np
 from jaxtyping import Float
 
 from pipeline.artifacts.tensors import from_tensor, to_tensor
+from pipeline.network.fine_tuning import FineTuning
 from pipeline.network.fitted_baselines import MEAN, BaselineErrors
 from pipeline.network.held_out import CLASSES, TestFigures, error_by_pictures
 from pipeline.network.resuming import EpochMetrics
 from pipeline.network.samples import Samples
 from pipeline.network.training import TrainedNetwork
 from schemas.softgrip.v1.training_pb2 import Epoch, TrainingResult
+from schemas.softgrip.v1.training_pb2 import FineTuning as FineTuningMessage
 
 CHECKPOINT = "ga_cnn.safetensors"
 EXPORT = "ga_cnn.onnx"
@@ -31,8 +33,10 @@ def epoch_message(metrics: EpochMetrics) -> Epoch:
     )
 
 
-def result_message(trained: TrainedNetwork, figures: TestFigures) -> TrainingResult:
-    """The message of a finished training."""
+def result_message(
+    trained: TrainedNetwork, figures: TestFigures, tuned: FineTuning | None
+) -> TrainingResult:
+    """The message of a finished training; ``tuned`` where it began with a trained network."""
     config, baselines = trained.network.config, figures.baselines
     return TrainingResult(
         layers=config.layers,
@@ -56,6 +60,21 @@ def result_message(trained: TrainedNetwork, figures: TestFigures) -> TrainingRes
         test_mae_as_proposed=figures.mae_as_proposed,
         mean_predictor_mae_as_proposed=baselines.as_proposed.get(MEAN),
         baseline_mae_as_proposed=baselines.as_proposed,
+        fine_tuning=FineTuningMessage(**vars(tuned)) if tuned else None,
+    )
+
+
+def fine_tuning_of(message: TrainingResult) -> FineTuning | None:
+    """What a training gained and forgot, read back; None where it began with no network."""
+    if not message.HasField("fine_tuning"):
+        return None
+    told = message.fine_tuning
+    return FineTuning(
+        own_before=told.own_before,
+        own_after=told.own_after,
+        released_before=told.released_before,
+        released_after=told.released_after,
+        released_grasps=told.released_grasps,
     )
 
 

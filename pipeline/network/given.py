@@ -6,7 +6,7 @@ from pathlib import Path
 from pipeline.errors import ArtifactError, ContentError
 from pipeline.network.checkpoint import load_checkpoint_bytes
 from pipeline.network.export import check_onnx_bytes, export_onnx_bytes
-from pipeline.network.sources import EXPORT_FILE, RELEASED, RELEASED_FOLDER
+from pipeline.network.released_files import EXPORT_FILE, RELEASED, RELEASED_FOLDER
 
 CHECKPOINT_SUFFIX = ".safetensors"
 

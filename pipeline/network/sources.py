@@ -14,10 +14,15 @@ from pipeline.errors import ArtifactError, ContentError
 from pipeline.network.analytic import AnalyticBaseline
 from pipeline.network.baselines import MonotoneRegressor
 from pipeline.network.control_inference import ControlPredictor
+from pipeline.network.released_files import (
+    BASELINE_FILE,
+    DIGESTS_FILE,
+    EXPORT_FILE,
+    RELEASED,
+    RELEASED_FOLDER,
+)
 
-RELEASED, ANALYTIC = "released", "analytic"
-RELEASED_FOLDER = Path(__file__).parent / "released"
-EXPORT_FILE, BASELINE_FILE, DIGESTS_FILE = "ga_cnn.onnx", "analytic.json", "digests.json"
+ANALYTIC = "analytic"
 
 Predict = Callable[
     [Float[np.ndarray, "n g g 3"], Bool[np.ndarray, "n g g"]], Float[np.ndarray, " n"]

@@ -10,6 +10,7 @@ at the same bytes as a run never killed. Several processes (``parallel``) take t
 takes, up to rounding.
 """
 
+import hashlib
 import json
 import math
 import os
@@ -28,6 +29,7 @@ from torch.nn.parallel import DistributedDataParallel
 from pipeline.config.learning import NetworkConfig, TrainConfig
 from pipeline.errors import MachineError
 from pipeline.network.canonical import CHANNELS, SYMMETRIES, apply_symmetry, network_input
+from pipeline.network.checkpoint import save_checkpoint_bytes
 from pipeline.network.ga_cnn import GaCnn, build_network
 from pipeline.network.loading import (
     RawBatch,
@@ -99,6 +101,7 @@ def train(
     loader_workers: int = 0,
     save_every_s: float = SAVE_EVERY_S,
     show_progress: bool = False,
+    start: GaCnn | None = None,
 ) -> TrainedNetwork:
     """Train a network; continue where an interrupted call with the same arguments stopped.
 
@@ -127,6 +130,8 @@ def train(
         Time between two saved states within an epoch [s].
     show_progress
         Whether to show a progress bar for each epoch.
+    start
+        A network like ``network`` whose weights are the first ones; None: drawn from the seed.
 
     Returns
     -------
@@ -142,9 +147,12 @@ def train(
         The resume state is damaged.
     """
     device = choose_device(config.device, ranks)
-    identity = _identity(config, network, seed, train_set, val_set, device)
+    identity = _identity(config, network, seed, train_set, val_set, device, start)
     with reproducible(config.threads):
-        model = build_network(network, seed).to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
+        model = build_network(network, seed)
+        if start is not None:
+            model.load_state_dict(start.state_dict())
+        model = model.to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
         if ranks.count > 1:
             sync_batch_norms(model)
         optimizer = build_optimizer(model, config)
@@ -375,6 +383,7 @@ def _identity(
     train_set: GraspTensors,
     val_set: GraspTensors,
     device: torch.device,
+    start: GaCnn | None,
 ) -> str:
     """All that the result depends on, as text: only a state of the same is continued."""
     parts = {
@@ -387,5 +396,6 @@ def _identity(
         "val_set": val_set.sha256(),
         "device": device.type,
         "torch": torch.__version__,
+        "start": hashlib.sha256(save_checkpoint_bytes(start)).hexdigest() if start else None,
     }
     return json.dumps(parts, sort_keys=True)

@@ -10,7 +10,8 @@ from jaxtyping import Float, Integer
 
 from pipeline.artifacts import open_artifact
 from pipeline.messages.samples import read_split
-from pipeline.messages.training import figures_of, metrics_of
+from pipeline.messages.training import figures_of, fine_tuning_of, metrics_of
+from pipeline.network.fine_tuning import FineTuning
 from pipeline.network.fitted_baselines import MEAN, TITLES
 from pipeline.network.held_out import TestFigures
 from pipeline.network.resuming import EpochMetrics
@@ -38,9 +39,13 @@ def draw_train(stage: FinishedStage, figures: Mapping[str, Any]) -> None:
     test_set = read_split(stage.upstream("shards"), "test")
     with open_artifact(stage.output) as artifact:
         history = [metrics_of(message) for _, message in artifact.messages(Epoch)]
-        held_out = figures_of(artifact.one(TrainingResult), test_set)
+        result = artifact.one(TrainingResult)
+    held_out, tuned = figures_of(result, test_set), fine_tuning_of(result)
     with recording(stage, blueprint()) as stream:
         show_training(stream, history, held_out, test_set, stage.config.recording.clouds)
+        if tuned:
+            told = rr.TextDocument(tuning_table(tuned), media_type=rr.MediaType.MARKDOWN)
+            stream.log("notes/fine_tuning", told, static=True)
 
 
 def blueprint() -> rrb.Blueprint:
@@ -53,7 +58,12 @@ def blueprint() -> rrb.Blueprint:
                 rrb.BarChartView(
                     origin="/curves/by_tenth", name="mean |q-hat - q| by tenth of q, test split"
                 ),
-                rrb.TextDocumentView(origin="/notes/result", name="Result on held-out objects"),
+                rrb.Tabs(
+                    rrb.TextDocumentView(origin="/notes/result", name="Result on held-out objects"),
+                    rrb.TextDocumentView(
+                        origin="/notes/fine_tuning", name="Gained and forgotten, if train.start"
+                    ),
+                ),
                 row_shares=[3, 1, 2, 3],
             ),
             rrb.Vertical(
@@ -132,6 +142,20 @@ def result_table(figures: TestFigures) -> str:
     ]
     lines = "\n".join(f"| {name} | {error} | {count} |" for name, error, count in rows)
     return f"| | mean &#124;q-hat - q&#124; | grasps |\n|-|-|-|\n{lines}\n"
+
+
+def tuning_table(tuned: FineTuning) -> str:
+    """What a network gained and forgot, as a person reads it (Markdown)."""
+    rows = [
+        ("this run's test split", tuned.own_before, tuned.own_after),
+        (
+            f"{tuned.released_grasps} test grasps of the released network",
+            tuned.released_before,
+            tuned.released_after,
+        ),
+    ]
+    lines = "\n".join(f"| {name} | {was:.4f} | {now:.4f} |" for name, was, now in rows)
+    return f"| mean &#124;q-hat - q&#124;, one prediction | before | after |\n|-|-|-|\n{lines}\n"
 
 
 def show_calibration(

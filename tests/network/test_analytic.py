@@ -12,6 +12,7 @@ from pipeline.network import sources
 from pipeline.network.analytic import fit_analytic, measured_quality, vertex_heights
 from pipeline.network.baselines import fit_monotone
 from pipeline.network.figures import mean_absolute_error
+from pipeline.network.released_files import RELEASED_FOLDER
 from pipeline.network.sources import (
     baseline_from_json,
     baseline_to_json,
@@ -102,8 +103,8 @@ def test_a_network_that_is_not_there_is_named(tmp_path: Path) -> None:
 
 def test_what_was_released_is_what_its_card_says() -> None:
     for name, digest in sources.released_digests().items():
-        assert sources.sha256_of(sources.RELEASED_FOLDER / name) == digest, name
-    files = [path for path in sources.RELEASED_FOLDER.iterdir() if path.is_file()]
+        assert sources.sha256_of(RELEASED_FOLDER / name) == digest, name
+    files = [path for path in RELEASED_FOLDER.iterdir() if path.is_file()]
     assert sum(path.stat().st_size for path in files) < 16 * 2**20
 
 

@@ -24,7 +24,7 @@ class Epoch(_message.Message):
     def __init__(self, epoch: _Optional[int] = ..., train_loss: _Optional[float] = ..., val_mae: _Optional[float] = ..., learning_rate: _Optional[float] = ..., train_mae: _Optional[float] = ..., samples: _Optional[int] = ...) -> None: ...
 
 class TrainingResult(_message.Message):
-    __slots__ = ("layers", "channels", "parameters", "best_epoch", "test_mae", "mean_predictor_mae", "baseline_mae", "test_mae_by_class", "test_mae_by_tenth", "calibration", "test_quality", "test_prediction", "val_mae", "test_mae_single", "test_count_by_class", "train_count", "val_count", "test_mae_as_proposed", "mean_predictor_mae_as_proposed", "baseline_mae_as_proposed", "test_mae_by_pictures")
+    __slots__ = ("layers", "channels", "parameters", "best_epoch", "test_mae", "mean_predictor_mae", "baseline_mae", "test_mae_by_class", "test_mae_by_tenth", "calibration", "test_quality", "test_prediction", "val_mae", "test_mae_single", "test_count_by_class", "train_count", "val_count", "test_mae_as_proposed", "mean_predictor_mae_as_proposed", "baseline_mae_as_proposed", "test_mae_by_pictures", "fine_tuning")
     class BaselineMaeEntry(_message.Message):
         __slots__ = ("key", "value")
         KEY_FIELD_NUMBER: _ClassVar[int]
@@ -81,6 +81,7 @@ class TrainingResult(_message.Message):
     MEAN_PREDICTOR_MAE_AS_PROPOSED_FIELD_NUMBER: _ClassVar[int]
     BASELINE_MAE_AS_PROPOSED_FIELD_NUMBER: _ClassVar[int]
     TEST_MAE_BY_PICTURES_FIELD_NUMBER: _ClassVar[int]
+    FINE_TUNING_FIELD_NUMBER: _ClassVar[int]
     layers: int
     channels: _containers.RepeatedScalarFieldContainer[int]
     parameters: int
@@ -102,7 +103,22 @@ class TrainingResult(_message.Message):
     mean_predictor_mae_as_proposed: float
     baseline_mae_as_proposed: _containers.ScalarMap[str, float]
     test_mae_by_pictures: _containers.ScalarMap[str, float]
-    def __init__(self, layers: _Optional[int] = ..., channels: _Optional[_Iterable[int]] = ..., parameters: _Optional[int] = ..., best_epoch: _Optional[int] = ..., test_mae: _Optional[float] = ..., mean_predictor_mae: _Optional[float] = ..., baseline_mae: _Optional[_Mapping[str, float]] = ..., test_mae_by_class: _Optional[_Mapping[str, float]] = ..., test_mae_by_tenth: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., calibration: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., test_quality: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., test_prediction: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., val_mae: _Optional[float] = ..., test_mae_single: _Optional[float] = ..., test_count_by_class: _Optional[_Mapping[str, int]] = ..., train_count: _Optional[int] = ..., val_count: _Optional[int] = ..., test_mae_as_proposed: _Optional[float] = ..., mean_predictor_mae_as_proposed: _Optional[float] = ..., baseline_mae_as_proposed: _Optional[_Mapping[str, float]] = ..., test_mae_by_pictures: _Optional[_Mapping[str, float]] = ...) -> None: ...
+    fine_tuning: FineTuning
+    def __init__(self, layers: _Optional[int] = ..., channels: _Optional[_Iterable[int]] = ..., parameters: _Optional[int] = ..., best_epoch: _Optional[int] = ..., test_mae: _Optional[float] = ..., mean_predictor_mae: _Optional[float] = ..., baseline_mae: _Optional[_Mapping[str, float]] = ..., test_mae_by_class: _Optional[_Mapping[str, float]] = ..., test_mae_by_tenth: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., calibration: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., test_quality: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., test_prediction: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., val_mae: _Optional[float] = ..., test_mae_single: _Optional[float] = ..., test_count_by_class: _Optional[_Mapping[str, int]] = ..., train_count: _Optional[int] = ..., val_count: _Optional[int] = ..., test_mae_as_proposed: _Optional[float] = ..., mean_predictor_mae_as_proposed: _Optional[float] = ..., baseline_mae_as_proposed: _Optional[_Mapping[str, float]] = ..., test_mae_by_pictures: _Optional[_Mapping[str, float]] = ..., fine_tuning: _Optional[_Union[FineTuning, _Mapping]] = ...) -> None: ...
+
+class FineTuning(_message.Message):
+    __slots__ = ("own_before", "own_after", "released_before", "released_after", "released_grasps")
+    OWN_BEFORE_FIELD_NUMBER: _ClassVar[int]
+    OWN_AFTER_FIELD_NUMBER: _ClassVar[int]
+    RELEASED_BEFORE_FIELD_NUMBER: _ClassVar[int]
+    RELEASED_AFTER_FIELD_NUMBER: _ClassVar[int]
+    RELEASED_GRASPS_FIELD_NUMBER: _ClassVar[int]
+    own_before: float
+    own_after: float
+    released_before: float
+    released_after: float
+    released_grasps: int
+    def __init__(self, own_before: _Optional[float] = ..., own_after: _Optional[float] = ..., released_before: _Optional[float] = ..., released_after: _Optional[float] = ..., released_grasps: _Optional[int] = ...) -> None: ...
 
 class SweepNetwork(_message.Message):
     __slots__ = ("group", "variant", "layers", "channels", "seed", "parameters", "multiply_adds", "val_mae", "val_mae_spread", "test_mae", "test_mae_single", "test_mae_averaged", "test_mae_by_class", "best_epoch", "curve", "chosen", "of_run")

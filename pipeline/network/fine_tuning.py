@@ -1,0 +1,192 @@
+"""Training that begins from a trained network: what it gains on new samples, and what it forgets.
+
+Forgetting is told on the released network's own test grasps, some of which lie beside it.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float
+
+from pipeline.config.learning import NetworkConfig, TrainConfig
+from pipeline.errors import ArtifactError, ConfigError, ContentError
+from pipeline.network.canonical import CHANNELS
+from pipeline.network.checkpoint import (
+    load_checkpoint_bytes,
+    tensors_from_bytes,
+    tensors_to_bytes,
+)
+from pipeline.network.figures import mean_absolute_error
+from pipeline.network.ga_cnn import GaCnn
+from pipeline.network.inference import predict
+from pipeline.network.released_files import RELEASED_FOLDER, TEST_GRASPS_FILE
+from pipeline.network.samples import GraspTensors
+
+_FORMAT = "softgrip.grasps"
+
+
+@dataclass(frozen=True)
+class FineTuning:
+    """Errors before and after, of one prediction a grasp: mean |q-hat - q|.
+
+    Attributes
+    ----------
+    own_before
+        Of the network that training began with, on the run's test split.
+    own_after
+        Of the trained one, on the same.
+    released_before
+        Of the first, on the released network's test grasps.
+    released_after
+        Of the trained one, on the same.
+    released_grasps
+        How many these are.
+    """
+
+    own_before: float
+    own_after: float
+    released_before: float
+    released_after: float
+    released_grasps: int
+
+    def headline(self) -> dict[str, Any]:
+        """The figures by the names that a stage's summary gives them."""
+        return {"fine_tuning": dict(vars(self))}
+
+
+def starting_network(data: bytes, named: str, wanted: NetworkConfig) -> GaCnn:
+    """The network that a training begins with.
+
+    Parameters
+    ----------
+    data
+        Its checkpoint.
+    named
+        What messages call it.
+    wanted
+        The run's [network].
+
+    Returns
+    -------
+    The network, on the CPU.
+
+    Raises
+    ------
+    ArtifactError
+        The bytes are no network, or its input is an older program's.
+    ConfigError
+        It is no network as the run wants one.
+    """
+    try:
+        network = load_checkpoint_bytes(data)
+    except ContentError as error:
+        raise ArtifactError(f"{named}: {error.what}", error.remedy) from error
+    if network.channels != CHANNELS:
+        raise ArtifactError(
+            f"{named} takes the input channels {', '.join(network.channels)} of an older program",
+            "Begin with a network of this program, or without train.start",
+        )
+    if network.config != wanted:
+        own = network.config
+        raise ConfigError(
+            f"{named}, named by train.start, has other layers or channels than the run's [network]",
+            f"Set network.layers = {own.layers}, network.channels = {list(own.channels)} and "
+            f"network.attention = '{own.attention}'",
+        )
+    return network
+
+
+def measure_fine_tuning(
+    start: GaCnn,
+    trained: GaCnn,
+    config: TrainConfig,
+    own: GraspTensors,
+    released: GraspTensors | None = None,
+) -> FineTuning:
+    """Errors of both networks on new test grasps and on those of the released network.
+
+    Parameters
+    ----------
+    start
+        The network that training began with.
+    trained
+        The network that came of it.
+    config
+        Batch size and threads to predict with.
+    own
+        The run's test split.
+    released
+        Test grasps of the released network; None: those that lie beside it.
+
+    Returns
+    -------
+    The figures.
+
+    Raises
+    ------
+    ArtifactError
+        The file beside the released network is damaged.
+    """
+    if released is None:
+        path = RELEASED_FOLDER / TEST_GRASPS_FILE
+        released = grasps_from_bytes(path.read_bytes(), str(path))
+
+    def error(network: GaCnn, grasps: GraspTensors) -> float:
+        predicted = predict(
+            *(network, grasps.cloud, grasps.mask),
+            *(config.batch_size, config.threads),
+            average_symmetries=False,
+        )
+        return mean_absolute_error(predicted, np.asarray(grasps.quality))
+
+    return FineTuning(
+        own_before=error(start, own),
+        own_after=error(trained, own),
+        released_before=error(start, released),
+        released_after=error(trained, released),
+        released_grasps=len(released),
+    )
+
+
+def grasps_to_bytes(
+    cloud: Float[np.ndarray, "n h w 3"],
+    mask: Bool[np.ndarray, "n h w"],
+    quality: Float[np.ndarray, " n"],
+) -> bytes:
+    """Labelled grasps as safetensors, clouds in half precision; equal ones give equal bytes."""
+    tensors = {
+        "cloud": torch.from_numpy(np.where(mask[..., None], cloud, 0).astype(np.float16)),
+        "mask": torch.from_numpy(np.array(mask)),
+        "quality": torch.from_numpy(np.array(quality, dtype=np.float32)),
+    }
+    return tensors_to_bytes(tensors, {"format": _FORMAT})
+
+
+def grasps_from_bytes(data: bytes, named: str) -> GraspTensors:
+    """Read back `grasps_to_bytes`.
+
+    Parameters
+    ----------
+    data
+        The file's bytes.
+    named
+        What messages call the file.
+
+    Returns
+    -------
+    The grasps.
+
+    Raises
+    ------
+    ArtifactError
+        The file is damaged, or is none of labelled grasps.
+    """
+    try:
+        tensors, metadata = tensors_from_bytes(data, named)
+    except ContentError as error:
+        raise ArtifactError(error.what, error.remedy) from error
+    if metadata.get("format") != _FORMAT or tensors.keys() != {"cloud", "mask", "quality"}:
+        raise ArtifactError(f"{named} holds no labelled grasps", "Make it again: make release")
+    return GraspTensors(*(tensors[name].numpy() for name in ("cloud", "mask", "quality")))

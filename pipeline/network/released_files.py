@@ -1,0 +1,10 @@
+"""The released network's files: where they lie and what they are called. Imports nothing large."""
+
+from pathlib import Path
+
+RELEASED = "released"  # what a person writes in a network's place
+RELEASED_FOLDER = Path(__file__).parent / "released"
+EXPORT_FILE = "ga_cnn.onnx"  # what control runs
+CHECKPOINT_FILE = "ga_cnn.safetensors"  # what a training begins with
+TEST_GRASPS_FILE = "test_grasps.safetensors"  # some of its own test grasps
+BASELINE_FILE, FIGURES_FILE, DIGESTS_FILE = "analytic.json", "figures.json", "digests.json"
