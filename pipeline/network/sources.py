@@ -14,13 +14,11 @@ from pipeline.errors import ArtifactError, ContentError
 from pipeline.network.analytic import AnalyticBaseline
 from pipeline.network.baselines import MonotoneRegressor
 from pipeline.network.control_inference import ControlPredictor
-from pipeline.network.released_files import (
-    BASELINE_FILE,
-    DIGESTS_FILE,
-    EXPORT_FILE,
-    RELEASED,
-    RELEASED_FOLDER,
-)
+from pipeline.network.released_files import BASELINE_FILE, DIGESTS_FILE, EXPORT_FILE
+
+# What callers write in a network's place.
+from pipeline.network.released_files import RELEASED as RELEASED
+from pipeline.network.released_files import RELEASED_FOLDER as RELEASED_FOLDER
 
 ANALYTIC = "analytic"
 
