@@ -29,7 +29,7 @@ ifeq (,$(strip $(WORKERS)))
 unexport WORKERS
 endif
 
-.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee holdout folds release review report export predict real calibrate live robot board docs lint fuzz regress plan list prune seal unseal query clean FORCE
+.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee holdout folds release review report export predict real sensors calibrate live robot board docs lint fuzz regress plan list prune seal unseal query clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -164,6 +164,10 @@ PREDICT_OPTIONS = $(foreach option,camera colour mask instances workspace depth-
 predict: .venv/.ready  ## grasps on a real picture: DEPTH=file [camera=file mask=file tilt_deg=90 ...]
 	@test -n "$(DEPTH)" || { echo "Give the picture: make predict DEPTH=file.depth.png"; exit 1; }
 	@$(PY) -m stages.predict $(DEPTH) $(PREDICT_OPTIONS)
+
+sensors: .venv/.ready  ## noise fitted to one camera's real frames: FRAMES=folder [names='bin_*' name=... scenes=12 grasps=40]
+	@test -n "$(FRAMES)" || { echo "Give the frames: make sensors FRAMES=folder"; exit 1; }
+	@$(PY) -m stages.sensors $(FRAMES) $(foreach option,name names scenes grasps,$(if $($(option)),--$(option) "$($(option))"))
 
 real: .venv/.ready  ## on real frames: FRAMES=folder [tilt_deg=90 ...]; q-hat against tried grasps: ATTEMPTS=files; to runs/<run>/real
 	@test -n "$(FRAMES)$(ATTEMPTS)" || { echo "Give the frames, or logged attempts: make real FRAMES=folder, make real ATTEMPTS=folder"; exit 1; }

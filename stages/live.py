@@ -65,10 +65,10 @@ def live(
     ranking = NetworkRanking(source.predict, config.sensing, radius_m, config.evaluate.policy)
     folder = out or RUNS_DIR / run / "live" / bag.stem
     with open_bag(bag) as opened:
-        began = time.perf_counter()
-        warm_up(opened, topic, depth_scale_m, LiveGrasps(ranking, config), config)
-        start_s = time.perf_counter() - began
         proposer = LiveGrasps(ranking, config)
+        began = time.perf_counter()
+        warm_up(opened, topic, depth_scale_m, proposer, config)
+        start_s = time.perf_counter() - began
         answered = list(
             in_recorded_time(
                 opened.pictures(topic, depth_scale_m),
@@ -111,7 +111,11 @@ def warm_up(
     proposer: LiveGrasps,
     config: RunConfig,
 ) -> None:
-    """Compile and load everything on the first picture; a robot's program does so at its start."""
+    """Compile and load everything, and find the support, on the first picture.
+
+    A robot's program does so at its start. Done in the stream it would cost the first answer half a
+    second and more, and the pictures that come meanwhile.
+    """
     first = next(bag.pictures(topic, scale_m), None)
     if first is None:
         raise PictureError(f"{bag.path} holds no picture on its topic", "Record it anew")

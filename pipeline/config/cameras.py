@@ -7,7 +7,9 @@ from pydantic import Field, model_validator
 
 from pipeline.config.section import LengthInMetres, ScaledSection, Section
 
-DepthSensor = Literal["ideal", "time-of-flight", "lidar", "structured-light"]
+DepthSensor = Literal[
+    "ideal", "time-of-flight", "lidar", "structured-light", "coded-light", "active-stereo"
+]
 RendererName = Literal["auto", "sapien", "embree"]
 
 

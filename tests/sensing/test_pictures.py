@@ -243,8 +243,8 @@ def test_every_sensor_has_its_published_spread(sensor: DepthSensor, view: Camera
     noisy = disturb(through(view, sensor), np.random.default_rng(5))
     depth = view.depth_m.astype(np.float64)
     flat = (view.segmentation == 0) & (noisy > 0)
-    sigma = model.floor_m + model.linear * depth + model.quadratic_1_m * (depth - 0.4) ** 2
-    units = ((noisy - depth) * cosine_of_incidence(view) / sigma)[flat]
+    sigma = model.sigma_m(depth, cosine_of_incidence(view))
+    units = ((noisy - depth) / np.sqrt(sigma**2 + model.step_m**2 / 12.0))[flat]
     assert units.std() == pytest.approx(1.0, abs=0.02)
     assert units.mean() == pytest.approx(0.0, abs=0.02)
 
