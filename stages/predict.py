@@ -24,7 +24,7 @@ from pipeline.artifacts import (
 )
 from pipeline.camera.frame_files import FrameFiles, read_frame, with_neighbours, within_workspace
 from pipeline.camera.prediction import Prediction
-from pipeline.camera.proposals import propose_grasps
+from pipeline.camera.proposals import frames_that_agree, propose_grasps
 from pipeline.config import RunConfig, load_run_config, section_digest
 from pipeline.control.ranking import NetworkRanking
 from pipeline.execution import RunFolder, generator, run_command
@@ -100,6 +100,7 @@ def predict(
     frames = [read_frame(item) for item in files]
     if workspace is not None:
         frames = [within_workspace(frame, workspace) for frame in frames]
+    frames = frames_that_agree(frames, config, generator(config.seed, "poses"))
     source = quality_source(network, config.gripper, THREADS)
     radius_m = config.gripper.pad.radius_m
     ranking = NetworkRanking(source.predict, config.sensing, radius_m, config.evaluate.policy)

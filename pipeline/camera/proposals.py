@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from loguru import logger
 from scipy import ndimage
 
 from pipeline.camera.frame import Frame
@@ -21,7 +22,7 @@ from pipeline.control.clearance import free_of_collision
 from pipeline.control.cloud import Cloud, DepthPicture, merged_cloud
 from pipeline.control.ranking import Ranking
 from pipeline.errors import PictureError
-from pipeline.geometry.transforms import frame_from_z, invert
+from pipeline.geometry.transforms import frame_from_z, invert, transform_points
 from pipeline.world.cameras import in_picture, points_of_depth, project
 
 EVERY_PX = 2  # every second pixel a side is enough to find planes
@@ -231,6 +232,60 @@ def support_of(frames: Sequence[Frame], config: RunConfig, rng: np.random.Genera
         )
     except PictureError as error:
         raise PictureError(f"{frames[0].name}: {error.what}", error.remedy) from error
+
+
+def frames_that_agree(
+    frames: Sequence[Frame], config: RunConfig, rng: np.random.Generator
+) -> list[Frame]:
+    """Frames whose poses fit together, by the support that each sees alone; others with a warning.
+
+    Merged frames whose poses do not fit show every surface twice, and what is a floor in one of
+    them stands out of the floor of the other.
+
+    Parameters
+    ----------
+    frames
+        Pictures of one scene; the first is kept in any case.
+    config
+        The run's configuration; ``predict.poses_agree_m`` bounds how far supports lie apart.
+    rng
+        Draws the points that planes are fitted to.
+
+    Returns
+    -------
+    The frames to merge. A frame that shows no support, or has no pose, cannot be told and is kept.
+    """
+    known = all(frame.posed for frame in frames) and config.predict.support.height_m is None
+    if len(frames) == 1 or not known:
+        return list(frames)
+    kept = [frames[0]]
+    first = _seen_alone(frames[0], config, rng)
+    for frame in frames[1:]:
+        own = _seen_alone(frame, config, rng)
+        if first is not None and own is not None and len(own.outline_m):
+            middle = np.append(own.outline_m.mean(axis=0), 0.0)[None]
+            in_world = transform_points(own.world_from_support, middle)
+            in_first = transform_points(invert(first.world_from_support), in_world)
+            off_m = abs(float(in_first[0, 2]))
+            if off_m > config.predict.poses_agree_m:
+                logger.warning(
+                    "{} is left out: the support that it shows lies {:.0f} mm off that of {}, so "
+                    "their poses do not fit together",
+                    frame.name,
+                    1e3 * off_m,
+                    frames[0].name,
+                )
+                continue
+        kept.append(frame)
+    return kept
+
+
+def _seen_alone(frame: Frame, config: RunConfig, rng: np.random.Generator) -> Support | None:
+    """The support of one frame; None where it shows none."""
+    try:
+        return support_of([frame], config, rng)
+    except PictureError:
+        return None
 
 
 def _upright(frame: Frame) -> Float[np.ndarray, "4 4"]:

@@ -137,6 +137,11 @@ class PredictConfig(Section):
     closer_contacts: int = Field(
         24, ge=1, le=256, description="contacts that are tried around each of them"
     )
+    poses_agree_m: float = Field(
+        0.02,
+        gt=0,
+        description="frames are merged where their supports lie no farther apart [m]",
+    )
     speck_share: float = Field(
         0.1,
         ge=0,

@@ -14,6 +14,7 @@ from pipeline.camera.proposals import (
     Proposals,
     apart,
     clear_of_support,
+    frames_that_agree,
     pixels_of,
     propose_grasps,
 )
@@ -97,6 +98,18 @@ def test_two_views_are_merged() -> None:
     target = box((0.12, 0.10, 0.08), (0.0, 0.0, 0.04))
     views = [seen([table(), target], eye, 0.001, posed=True) for eye in (ABOVE, (-0.05, 0.35, 0.6))]
     assert proposed(views).world_from_contact[0, 2, 3] == pytest.approx(0.08, abs=0.004)
+
+
+def test_frames_whose_poses_do_not_fit_are_not_merged() -> None:
+    target = box((0.12, 0.10, 0.08), (0.0, 0.0, 0.04))
+    one, other = (
+        seen([table(), target], eye, 0.001, posed=True) for eye in (ABOVE, (-0.05, 0.35, 0.6))
+    )
+    rng = np.random.default_rng(0)
+    assert frames_that_agree([one, other], CONFIG, rng) == [one, other]
+    lifted = np.eye(4)
+    lifted[2, 3] = 0.05
+    assert frames_that_agree([one, other.moved(lifted)], CONFIG, rng) == [one]
 
 
 def test_the_best_places_are_looked_at_more_closely() -> None:
