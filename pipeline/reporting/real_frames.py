@@ -63,7 +63,7 @@ def trial_page(figures: Mapping[str, Any], config: PredictConfig, sheet: str) ->
         f"| {row['frames']} | {row['with_a_choice']} | {row['good']} "
         f"| {_of(row['in_mask'], row['masked'])} | {_of(row['off_edges'], row['with_a_choice'])} "
         f"| {_of(row['in_mask_and_off_edges'], row['masked'])} "
-        f"| {row['seconds']:.2f} s |"
+        f"| {_seconds(row['seconds'])} |"
         for row in figures["together"]
     )
     stability = "\n".join(
@@ -125,7 +125,7 @@ def _together(group: Sequence[FrameTrial], apart_m: float) -> dict[str, Any]:
         "in_mask_and_off_edges": sum(bool(first.in_mask) and first.off_edges for first in masked),
         "redrawn": _stability([(trial, trial.redrawn) for trial in group], apart_m),
         "thinned": _stability([(trial, trial.thinned) for trial in group], apart_m),
-        "seconds": float(np.median([trial.seconds for trial in group])),
+        "seconds": _median([trial.seconds for trial in group]),
     }
 
 
@@ -144,7 +144,7 @@ def _one(trial: FrameTrial, apart_m: float) -> dict[str, Any]:
         "thinned_moved_mm": _millimetres(trial.thinned),
         "redrawn": _stability([(trial, trial.redrawn)], apart_m),
         "thinned": _stability([(trial, trial.thinned)], apart_m),
-        "seconds": trial.seconds,
+        "seconds": _median([trial.seconds]),
     }
 
 
@@ -176,6 +176,16 @@ def _millimetres(found: Stability | None) -> list[float | None]:
     if found is None:
         return []
     return [round(1e3 * float(m), 1) if np.isfinite(m) else None for m in found.moved_m]
+
+
+def _median(seconds: Sequence[float]) -> float | None:
+    """Median of those that there are: a frame that is refused has no time."""
+    there = [value for value in seconds if np.isfinite(value)]
+    return float(np.median(there)) if there else None
+
+
+def _seconds(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2f} s"
 
 
 def _of(number: int, total: int) -> str:

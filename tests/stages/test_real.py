@@ -53,6 +53,7 @@ def test_every_use_of_every_frame_has_its_figures(results: Path) -> None:
         if row["frame"] == "empty":
             assert "nothing stands out of the support" in row["refused"]
             assert row["quality"] is None
+            assert row["seconds"] is None
         else:
             assert row["in_mask"]  # nothing but the box stands on the table
             assert len(row["redrawn_moved_mm"]) == len(row["thinned_moved_mm"]) == 3
@@ -70,6 +71,7 @@ def test_together_counts_what_each_says(results: Path) -> None:
             if (trial["ranking"], trial["kept_to_mask"]) == (row["ranking"], row["kept_to_mask"])
         ]
         assert row["frames"] == len(same)
+        assert row["seconds"] > 0
         assert row["with_a_choice"] == sum(trial["quality"] is not None for trial in same)
         assert row["off_edges"] == sum(bool(trial["off_edges"]) for trial in same)
 
