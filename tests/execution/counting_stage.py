@@ -21,7 +21,7 @@ def build(stage: StageContext) -> Summary:
         raise ZeroDivisionError("by zero")
     if mood == "slow":
         stage.folder.state("slow").touch()
-        time.sleep(30)
+        time.sleep(600)  # until it is interrupted
     stage.recording.write_bytes(b"")
     with ArtifactWriter(stage.output, stage.provenance()) as artifact:
         artifact.write("/x", RefusedMesh(source="x"), log_time_ns=0)

@@ -112,13 +112,13 @@ def test_an_exception_that_cannot_be_pickled_is_told_in_words() -> None:
 def test_an_exception_of_the_consumer_leaves_no_process() -> None:
     def consume() -> None:
         with Isolation(2, PLENTY) as apart:
-            for _ in apart.run_in_order(rest, [0.0, 30.0, 30.0]):
+            for _ in apart.run_in_order(rest, [0.0, 600.0, 600.0]):
                 raise KeyboardInterrupt
 
     started = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
         consume()
-    assert time.monotonic() - started < 25
+    assert time.monotonic() - started < 300  # no item is waited for
     assert not multiprocessing.active_children()
 
 

@@ -34,9 +34,9 @@ def sockets_of(pids: list[int]) -> set[str]:
     links = []
     for pid in pids:
         # A running process closes files, and may end, while it is looked at.
-        with suppress(FileNotFoundError):
+        with suppress(FileNotFoundError, ProcessLookupError):
             for fd in Path(f"/proc/{pid}/fd").iterdir():
-                with suppress(FileNotFoundError):
+                with suppress(FileNotFoundError, ProcessLookupError):
                     links.append(str(fd.readlink()))
     return {link[8:-1] for link in links if link.startswith("socket:[")}
 

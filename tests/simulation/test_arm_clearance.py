@@ -107,9 +107,9 @@ def test_a_pose_of_the_arm_is_judged_in_little_time() -> None:
     q = degrees(0, 30, 0, -90, 0, 60, 0)
     spent = []
     for _ in range(50):
-        begun = time.perf_counter()
+        begun = time.process_time()
         assert CLEARANCE.is_free(q)
-        spent.append(time.perf_counter() - begun)
+        spent.append(time.process_time() - begun)
     assert np.median(spent) < 3e-3
 
 

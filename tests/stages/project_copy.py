@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tests.stages.conftest import ROOT
 
-NOT_COPIED = (".git", ".venv", ".cache", "*_cache", "__pycache__", ".hypothesis", "node_modules")
+NOT_COPIED = (".git", ".venv", ".cache", "*_cache", ".hypothesis", "node_modules")
 SET_FOR_OTHER_RUNS = (
     *("MESH_DIR", "RUN", "STAGE", "FORMAT", "WORKERS", "EXECUTOR"),
     *("MAKEFLAGS", "MAKELEVEL", "MFLAGS"),
@@ -15,11 +15,25 @@ SET_FOR_OTHER_RUNS = (
 
 
 def copied_project(copy: Path) -> Path:
-    """Everything but the runs, with the environment that runs the tests."""
-    shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(*NOT_COPIED, "runs"))
+    """Everything but the runs, with the environment that runs the tests.
+
+    What is compiled comes along: numba takes nine seconds of processor to make the labels alone.
+    """
+    ignored = shutil.ignore_patterns(*NOT_COPIED, "runs")
+    shutil.copytree(ROOT, copy, ignore=ignored, copy_function=copied_unless_gone)
     (copy / "runs").mkdir()
     _give_environment(copy)
     return copy
+
+
+def copied_unless_gone(source: str, target: str) -> str:
+    """Copy a file; a compiled one may vanish, as other processes rename theirs when it is whole."""
+    try:
+        return shutil.copy2(source, target)
+    except FileNotFoundError:
+        if Path(source).parent.name != "__pycache__":
+            raise
+        return target
 
 
 def quiet_environment() -> dict[str, str]:

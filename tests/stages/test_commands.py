@@ -13,7 +13,7 @@ from tests.docs.pages import PAGES, REDUCED, ROOT, as_run, blocks_of
 from tests.stages.project_copy import copied_project, quiet_environment
 
 SHOWN_RUNS = ("ci", "default")
-# Its commands make run ci from nothing; those of the other pages find a tiny one made.
+# Its commands make run ci from nothing but cut objects; those of other pages find a tiny one made.
 FROM_COLD = "README.md"
 
 
@@ -24,6 +24,8 @@ def copy(run: RunFolder, tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copytree(ROOT / "runs" / "pictures", copy / "runs" / "pictures")
     for name in SHOWN_RUNS:
         shutil.copytree(run.path, copy / "runs" / name)
+    # Convex parts are a cache beside all runs; how they are made cold has tests of its own.
+    shutil.copytree(run.path.parent / ".cache", copy / "runs" / ".cache")
     for config in (ROOT / "runs").glob("*/run.toml"):
         if config.parent.name not in SHOWN_RUNS:
             shutil.copytree(config.parent, copy / "runs" / config.parent.name, ignore=only_config)

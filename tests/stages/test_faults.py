@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 
@@ -227,10 +227,14 @@ def test_a_worker_killed_for_its_memory(run: RunFolder, tmp_path: Path, stage: s
 
 
 def workers_of(pid: int) -> list[int]:
-    """Spawned worker processes, resource trackers left out."""
+    """Spawned worker processes, resource trackers left out.
+
+    A process may end between two looks at /proc; one that did is no worker any more.
+    """
     found = []
-    for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
-        command = Path(f"/proc/{child}/cmdline")
-        if command.is_file() and b"spawn_main" in command.read_bytes():
-            found.append(int(child))
+    with suppress(FileNotFoundError, ProcessLookupError):
+        for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
+            with suppress(FileNotFoundError, ProcessLookupError):
+                if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes():
+                    found.append(int(child))
     return found

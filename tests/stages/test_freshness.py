@@ -12,6 +12,7 @@ from pipeline.execution import RunFolder
 from pipeline.execution.staleness import is_fresh, stage_context
 from stages.graph import STAGES, inputs_of
 from tests.stages.conftest import ROOT
+from tests.stages.project_copy import copied_unless_gone
 from tests.stages.test_pipeline import digests
 
 PROJECT = ("Makefile", "pyproject.toml", "constraints.txt", "pipeline", "stages", "schemas")
@@ -24,7 +25,8 @@ def project(run: RunFolder, tmp_path_factory: pytest.TempPathFactory) -> Path:
     for name in PROJECT:
         source = ROOT / name
         if source.is_dir():
-            shutil.copytree(source, copy / name)  # with what is compiled, which takes long
+            # With what is compiled, which takes long.
+            shutil.copytree(source, copy / name, copy_function=copied_unless_gone)
         else:
             shutil.copy2(source, copy / name)
             os.utime(copy / name, (0, 0))  # older than the environment, which is shared
