@@ -110,8 +110,10 @@ def test_an_exception_that_cannot_be_pickled_is_told_in_words() -> None:
 
 
 def test_an_exception_of_the_consumer_leaves_no_process() -> None:
+    long = Allowance(seconds=1200, memory_mib=100)  # else its end would be the items' end
+
     def consume() -> None:
-        with Isolation(2, PLENTY) as apart:
+        with Isolation(2, long) as apart:
             for _ in apart.run_in_order(rest, [0.0, 600.0, 600.0]):
                 raise KeyboardInterrupt
 
