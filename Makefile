@@ -29,7 +29,7 @@ ifeq (,$(strip $(WORKERS)))
 unexport WORKERS
 endif
 
-.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee holdout folds release review report export predict real sensors calibrate live robot board docs lint fuzz regress plan list prune seal unseal query clean FORCE
+.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee holdout folds release review report export predict real sensors calibrate live robot board docs lint fuzz regress plan list prune seal unseal query diff clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -87,6 +87,9 @@ list: .venv/.ready  ## every run: disk, stages, headline figures, stale or not, 
 	@$(PY) -m stages.runs list
 prune: .venv/.ready  ## what can be made again, of all runs; FREE=1 deletes it
 	@$(PY) -m stages.runs prune $(if $(FREE),--free)
+diff: .venv/.ready  ## what differs between two runs, and what is chance: A=run B=run, to runs/<A>/diff-<B>
+	@test -n "$(A)" -a -n "$(B)" || { echo "Name two runs: make diff A=run B=run"; exit 1; }
+	@A="$(A)" B="$(B)" $(PY) -m stages.diff
 seal: .venv/.ready  ## finish RUN: nothing in it is made anew, here or on another machine
 	@$(PY) -m stages.runs seal
 unseal: .venv/.ready  ## take the seal off RUN

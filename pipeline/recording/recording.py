@@ -49,6 +49,7 @@ TIMELINES = {
     "predict": "grasp",
     "referee": "grasp",
     "holdout": "object",
+    "diff": "group",
 }
 
 

@@ -95,6 +95,22 @@ def label_histogram(by_split: Mapping[str, Sequence[int]]) -> str:
         return _svg(figure)
 
 
+def compared_histograms(by_run: Mapping[str, Sequence[int]]) -> str:
+    """Labels of several runs by tenth of q, as shares, a bar a run."""
+    with mpl.rc_context(STYLE):
+        figure, (axes,) = _axes(1, 2.4)
+        width = 0.8 / len(by_run)
+        for number, (run, counts) in enumerate(by_run.items()):
+            x = np.arange(len(counts)) + 0.1 + width * (number + 0.5)
+            shares = np.array(counts) / max(sum(counts), 1)
+            colour = _rgb(PALETTE[number % len(PALETTE)])
+            axes.bar(x, shares, width, label=f"{run} ({sum(counts)})", ec="white", color=colour)
+        axes.set_xticks(range(11), [f"{tenth / 10:.1f}" for tenth in range(11)])
+        axes.set(xlabel="grasp quality q [1]", ylabel="share of grasps")
+        axes.legend()
+        return _svg(figure)
+
+
 def training_curve(
     train: Sequence[float], val: Sequence[float], best_epoch: int, mean_predictor: float
 ) -> str:
