@@ -29,7 +29,7 @@ ifeq (,$(strip $(WORKERS)))
 unexport WORKERS
 endif
 
-.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee holdout folds release review report export predict real sensors calibrate live robot board docs lint fuzz regress plan list prune seal unseal query diff clean FORCE
+.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee holdout folds release review report export predict real sensors calibrate live robot board docs lint fuzz regress plan list prune seal unseal query diff publish clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -161,6 +161,9 @@ report: .venv/.ready  ## the run on one page, to runs/<run>/report.html and repo
 
 export: .venv/.ready  ## dataset as FORMAT=acronym|graspgen|webdataset|parquet|bop|usd|lerobot, to runs/<run>/export
 	@FORMAT=$(or $(FORMAT),acronym) $(PY) -m stages.export
+
+publish: .venv/.ready  ## dataset as a folder for a dataset hub or an archive, to runs/<run>/publish
+	@$(PY) -m stages.publish
 
 PREDICT_OPTIONS = $(foreach option,camera colour mask instances workspace depth-scale-m radius-mm tilt-deg top out,\
   $(if $($(subst -,_,$(option))),--$(option) "$($(subst -,_,$(option)))"))

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from pipeline.artifacts.checksums import verify_folder
 from pipeline.artifacts.inspection import Contents, read_contents, run_folder, verify_files
 from pipeline.errors import SoftgripError
 
@@ -13,6 +14,7 @@ EXIT_FAILURE = 1  # what shells read as a failure
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 File = Annotated[Path, typer.Argument(help="an .mcap of a run")]
+Made = Annotated[Path, typer.Argument(help="an .mcap of a run, or a published folder")]
 
 
 @app.command()
@@ -23,14 +25,22 @@ def inspect(file: File) -> None:
 
 @app.command()
 def verify(
-    file: File,
+    file: Made,
     mesh_dir: Annotated[
         Path | None, typer.Option(envvar="MESH_DIR", help="folder of the meshes it was made from")
     ] = None,
 ) -> None:
-    """Hash a file and all it was made from, up to the meshes; non-zero where one differs."""
+    """Hash a file and all it was made from, up to the meshes; non-zero where one differs.
+
+    Of a published folder, every file is compared with the list of digests.
+    """
     wrong = whole = 0
-    for finding in verify_files(file, mesh_dir or read_mesh_dir_note(file)):
+    findings = (
+        verify_folder(file)
+        if file.is_dir()
+        else verify_files(file, mesh_dir or read_mesh_dir_note(file))
+    )
+    for finding in findings:
         if finding.problem:
             wrong += 1
             sys.stdout.write(f"wrong  {finding.path}: {finding.problem}\n")

@@ -13,3 +13,9 @@ class DatasetConfig(Section):
     licence: str = Field(
         "", description="licence of the meshes; without it that of the mesh folder's own file"
     )
+    version: str = Field(
+        "1.0.0", pattern=r"^\d+\.\d+\.\d+$", description="of the dataset that is published"
+    )
+    preview_samples: int = Field(
+        1000, ge=1, le=100_000, description="samples a split in a published dataset's preview"
+    )
