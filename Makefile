@@ -29,7 +29,7 @@ ifeq (,$(strip $(WORKERS)))
 unexport WORKERS
 endif
 
-.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee holdout folds release review report export predict real sensors calibrate live robot board docs lint fuzz regress plan list prune seal unseal query diff publish clean FORCE
+.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee holdout folds release review report export predict real sensors calibrate live robot board docs lint fuzz regress plan list prune seal unseal query diff publish expect clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -90,6 +90,8 @@ prune: .venv/.ready  ## what can be made again, of all runs; FREE=1 deletes it
 diff: .venv/.ready  ## what differs between two runs, and what is chance: A=run B=run, to runs/<A>/diff-<B>
 	@test -n "$(A)" -a -n "$(B)" || { echo "Name two runs: make diff A=run B=run"; exit 1; }
 	@A="$(A)" B="$(B)" $(PY) -m stages.diff
+expect: .venv/.ready  ## what must hold of RUN's artifacts, and whether it does
+	@$(PY) -m stages.expect
 seal: .venv/.ready  ## finish RUN: nothing in it is made anew, here or on another machine
 	@$(PY) -m stages.runs seal
 unseal: .venv/.ready  ## take the seal off RUN

@@ -93,6 +93,11 @@ def make_report(folder: RunFolder) -> Path:
             "overall": overall_rates(summaries["evaluate"]),
             "comparisons": (summaries["evaluate"] or {}).get("comparisons", {}),
             "failures": failures,
+            "expectations": {
+                name: found["expectations"]
+                for name, found in summaries.items()
+                if found and found.get("expectations")
+            },
             "timings": {name: found for name, found in summaries.items() if found},
             "shards_key": next((p.key[:12] for p in provenance if p.stage == "shards"), "none"),
         },

@@ -37,6 +37,7 @@ from pipeline.config.grasps import (
 from pipeline.config.holdout import HoldoutConfig
 from pipeline.config.learning import NetworkConfig, ShardsConfig, SweepConfig, TrainConfig
 from pipeline.config.objects import ObjectsConfig, SplitConfig
+from pipeline.config.expectations import Expectation
 from pipeline.config.predict import PredictConfig
 from pipeline.config.referee import RefereeConfig
 from pipeline.config.scenes import ScenesConfig
@@ -90,6 +91,9 @@ class RunConfig(Section):
     predict: PredictConfig = PredictConfig()
     recording: RecordingConfig = RecordingConfig()
     dataset: DatasetConfig = DatasetConfig()
+    expect: tuple[Expectation, ...] = Field(
+        (), description="further expectations, beside those that hold for every run"
+    )
 
     @model_validator(mode="before")
     @classmethod

@@ -18,6 +18,8 @@ from loguru import logger
 
 from pipeline.artifacts import open_artifact, publish_bytes, read_provenance
 from pipeline.artifacts.publishing import CANNOT_WRITE, remove_abandoned_scratch, write_error
+from pipeline.asking.cache import QUERY_CACHE
+from pipeline.asking.expectations import Found, check_expectations
 from pipeline.errors import SoftgripError
 from pipeline.execution.commands import EXIT_FAILURE, log_to
 from pipeline.execution.executors import Executor
@@ -33,6 +35,7 @@ from pipeline.execution.staleness import (
 )
 from pipeline.interchange.foxglove_layouts import foxglove_layout
 from pipeline.stopwatch import processor_time_s
+from schemas.tables import TABLES
 
 Summary = dict[str, Any]
 Build = Callable[[StageContext], Summary]
@@ -122,6 +125,7 @@ def run_stage(
         return
     logger.info("{}: started ({} workers)", name, context.workers)
     figures = build(context)
+    context = replace(context, expected=told_expectations(context))
     if draw is not None:
         draw_recording(context, draw, figures)
     wall_s, spent_s = time.perf_counter() - started, processor_time_s() - spent_s
@@ -131,6 +135,7 @@ def run_stage(
         "wall_time_s": round(wall_s, 3),
         "recording_share": round(context.drawing.seconds / max(spent_s, CLOCK_TICK_S), 4),
         **_recording_size(context),
+        "expectations": [one.figures() for one in context.expected],
         **figures,
     }
     _publish_summary(context, record)
@@ -144,6 +149,21 @@ def draw_recording(context: StageContext, draw: Draw, figures: Summary) -> None:
     draw(context, figures)
     note = context.drawing_key.to_json().encode()
     publish_bytes(drawing_note_path(context.folder, context.name), note)
+
+
+def told_expectations(context: StageContext) -> tuple[Found, ...]:
+    """Check what is expected at the end of the stage, and tell what does not hold."""
+    stages = {table.stage for table in TABLES}
+    made = {name: context.folder.artifact(name) for name in sorted(stages)}
+    made = {name: path for name, path in made.items() if path.is_file()}
+    found = check_expectations(
+        context.name, context.config.expect, made, context.folder.state(QUERY_CACHE)
+    )
+    for one in found:
+        if one.problem:
+            tell = logger.error if one.is_error else logger.warning
+            tell("{}: {}: {}. {}", context.name, one.expected.name, one.problem, one.expected.reason)
+    return tuple(found)
 
 
 def read_summary(folder: RunFolder, stage: str) -> Summary:

@@ -21,7 +21,7 @@ import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 import pyarrow.compute  # noqa: F401 - Rerun loads it at the first bar chart, amid the logging
@@ -73,6 +73,15 @@ class Recorded(Protocol):
         """Counts the processor time spent on recording."""
 
 
+@runtime_checkable
+class Expecting(Protocol):
+    """A stage that was checked against what is expected of its artifact."""
+
+    @property
+    def expectations(self) -> str:
+        """What was expected and found, Markdown; empty where nothing was checked."""
+
+
 class FinishedStage(Recorded, Protocol):
     """A stage whose artifact is finished; its recording is drawn from the artifact."""
 
@@ -115,6 +124,9 @@ def recording(stage: Recorded, blueprint: rrb.Blueprint) -> Iterator[rr.Recordin
         name = f"{APPLICATION}_{stage.name}"
         stream = rr.RecordingStream(name, recording_id=stage.recording_id)
         stream.save(scratch, default_blueprint=blueprint)
+        if isinstance(stage, Expecting) and stage.expectations:
+            note = rr.TextDocument(stage.expectations, media_type=rr.MediaType.MARKDOWN)
+            stream.log("notes/expectations", note, static=True)
         try:
             yield stream
         finally:

@@ -1,0 +1,140 @@
+"""What is expected of a run's artifacts, and what is found of it."""
+
+import math
+import time
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter, ValidationError
+
+from pipeline.asking.query import ask
+from pipeline.config.expectations import Expectation
+from pipeline.errors import ConfigError, SoftgripError
+
+DECLARED = Path(__file__).resolve().parents[2] / "schemas" / "expectations.toml"
+
+
+@dataclass(frozen=True)
+class Found:
+    """One expectation, and what was found.
+
+    Attributes
+    ----------
+    expected
+        What must hold.
+    value
+        The answer; None where there was none.
+    problem
+        What does not hold, in words; empty where it holds.
+    """
+
+    expected: Expectation
+    value: float | None
+    problem: str
+
+    @property
+    def is_error(self) -> bool:
+        """Whether something does not hold that must."""
+        return bool(self.problem) and self.expected.severity == "error"
+
+    def figures(self) -> dict[str, Any]:
+        """By the names that summaries use."""
+        return {
+            "name": self.expected.name,
+            "severity": self.expected.severity,
+            "value": self.value,
+            "problem": self.problem,
+        }
+
+
+@cache
+def declared_expectations() -> tuple[Expectation, ...]:
+    """Those that hold for every run, from schemas/expectations.toml.
+
+    Returns
+    -------
+    The expectations, in the order of the file.
+
+    Raises
+    ------
+    ConfigError
+        The file is damaged.
+    """
+    try:
+        entries = tomllib.loads(DECLARED.read_text())["expect"]
+        return TypeAdapter(tuple[Expectation, ...]).validate_python(entries)
+    except (KeyError, ValueError, ValidationError) as error:
+        raise ConfigError(f"{DECLARED} cannot be read ({error})", "Install softgrip anew") from error
+
+
+def check_expectations(
+    stage: str, own: Sequence[Expectation], artifacts: Mapping[str, Path], cache_folder: Path
+) -> list[Found]:
+    """Check what is expected at the end of a stage.
+
+    Parameters
+    ----------
+    stage
+        Name of the stage.
+    own
+        What run.toml expects beside what is declared for every run.
+    artifacts
+        Stage → artifact, of those that are there.
+    cache_folder
+        Keeps the rows of artifacts that did not change.
+
+    Returns
+    -------
+    One finding for each expectation of that stage.
+    """
+    expected = [one for one in (*declared_expectations(), *own) if one.stage == stage]
+    return [check(one, artifacts, cache_folder) for one in expected]
+
+
+def check(expected: Expectation, artifacts: Mapping[str, Path], cache_folder: Path) -> Found:
+    """Ask one number and hold it against its bounds; what cannot be asked does not hold."""
+    try:
+        answer = ask(expected.sql, artifacts, cache_folder)
+    except SoftgripError as error:
+        return Found(expected, None, f"cannot be asked: {error.what}")
+    if answer.num_rows != 1 or answer.num_columns != 1:
+        shape = f"{answer.num_rows} rows of {answer.num_columns} columns"
+        return Found(expected, None, f"the answer must be one number, and is {shape}")
+    value = answer.column(0)[0].as_py()
+    if value is None or not math.isfinite(float(value)):
+        return Found(expected, None, "there is no number")
+    return Found(expected, float(value), outside(float(value), expected))
+
+
+def outside(value: float, expected: Expectation) -> str:
+    """How a value leaves its bounds, in words; empty within them."""
+    if expected.at_least is not None and value < expected.at_least:
+        return f"is {value:g}, must be at least {expected.at_least:g}"
+    if expected.at_most is not None and value > expected.at_most:
+        return f"is {value:g}, must be at most {expected.at_most:g}"
+    return ""
+
+
+def timed_check(
+    stage: str, own: Sequence[Expectation], artifacts: Mapping[str, Path], cache_folder: Path
+) -> tuple[list[Found], float]:
+    """`check_expectations`, and the wall time that it took [s]."""
+    started = time.perf_counter()
+    found = check_expectations(stage, own, artifacts, cache_folder)
+    return found, time.perf_counter() - started
+
+
+def as_markdown(found: Sequence[Found]) -> str:
+    """A table of what was found, what does not hold first."""
+    rows = sorted(found, key=lambda one: (not one.is_error, not one.problem))
+    lines = ["| expected | found | |", "|-|-|-|"]
+    for one in rows:
+        value = "none" if one.value is None else f"{one.value:g}"
+        verdict = f"**{one.expected.severity}**: {one.problem}" if one.problem else "holds"
+        name = one.expected.name.replace("|", "\\|")
+        lines.append(f"| {name} | {value} | {verdict.replace('|', chr(92) + '|')} |")
+    return "\n".join(lines) + "\n"
