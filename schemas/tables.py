@@ -94,6 +94,16 @@ TABLES = (
         ),
     ),
     Table(
+        "refused",
+        "objects",
+        "a mesh that did not become an object",
+        (
+            Column("source", TEXT, "mesh file"),
+            Column("reason", TEXT, "why, in words"),
+            Column("remedy", TEXT, "what a person can do"),
+        ),
+    ),
+    Table(
         "scenes",
         "scenes",
         "a clutter at rest",

@@ -13,10 +13,10 @@ import numpy as np
 import pyarrow as pa
 from filelock import FileLock
 
+from pipeline.artifacts.digests import content_digests
 from pipeline.artifacts.publishing import published
 from pipeline.asking.rows import NONE, ROWS, Part, Values, Words
 from pipeline.errors import ArtifactError
-from pipeline.execution.freshness import content_digests
 from schemas.tables import BY_NAME, TEXT, Table
 
 QUERY_CACHE = "query"  # in the run's state

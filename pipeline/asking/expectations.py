@@ -68,7 +68,9 @@ def declared_expectations() -> tuple[Expectation, ...]:
         entries = tomllib.loads(DECLARED.read_text())["expect"]
         return TypeAdapter(tuple[Expectation, ...]).validate_python(entries)
     except (KeyError, ValueError, ValidationError) as error:
-        raise ConfigError(f"{DECLARED} cannot be read ({error})", "Install softgrip anew") from error
+        raise ConfigError(
+            f"{DECLARED} cannot be read ({error})", "Install softgrip anew"
+        ) from error
 
 
 def check_expectations(

@@ -18,7 +18,7 @@ from pipeline.messages.grasps import read_grasps
 from pipeline.messages.samples import samples_of
 from pipeline.read_only import read_only
 from schemas.softgrip.v1.evaluation_pb2 import Attempt
-from schemas.softgrip.v1.objects_pb2 import CatalogueObject
+from schemas.softgrip.v1.objects_pb2 import CatalogueObject, RefusedMesh
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 from schemas.softgrip.v1.scenes_pb2 import Scene
 from schemas.softgrip.v1.training_pb2 import Epoch
@@ -98,6 +98,14 @@ def object_rows(path: Path) -> Iterator[Part]:
         "copies": np.array([len(item.copies) for item in found]),
         "key": words([item.key for item in found]),
     }
+
+
+def refused_rows(path: Path) -> Iterator[Part]:
+    """Rows of table refused."""
+    with open_artifact(path) as artifact:
+        found = [message for _, message in artifact.messages(RefusedMesh)]
+    same = ("source", "reason", "remedy")
+    yield {name: words([getattr(item, name) for item in found]) for name in same}
 
 
 def scene_rows(path: Path) -> Iterator[Part]:
@@ -272,6 +280,7 @@ def whole_shards(index: Path) -> Iterator[tuple[Path, str]]:
 
 ROWS: Mapping[str, Callable[[Path], Iterator[Part]]] = {
     "objects": object_rows,
+    "refused": refused_rows,
     "scenes": scene_rows,
     "placed_objects": placed_rows,
     "grasps": grasp_rows,

@@ -24,6 +24,7 @@ from pipeline.config.agreement import AgreementConfig
 from pipeline.config.cameras import CamerasConfig
 from pipeline.config.dataset import DatasetConfig
 from pipeline.config.evaluation import EvaluateConfig, RecordingConfig
+from pipeline.config.expectations import Expectation
 from pipeline.config.folds import FoldsConfig
 from pipeline.config.grasps import (
     CELL_SIDE,
@@ -37,7 +38,6 @@ from pipeline.config.grasps import (
 from pipeline.config.holdout import HoldoutConfig
 from pipeline.config.learning import NetworkConfig, ShardsConfig, SweepConfig, TrainConfig
 from pipeline.config.objects import ObjectsConfig, SplitConfig
-from pipeline.config.expectations import Expectation
 from pipeline.config.predict import PredictConfig
 from pipeline.config.referee import RefereeConfig
 from pipeline.config.scenes import ScenesConfig

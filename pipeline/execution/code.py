@@ -16,6 +16,8 @@ DRAWING = ("pipeline.recording",)  # what only draws: no result may be from it
 # What starts, times, orders and tells stages; no byte of an artifact is from it. Its own text
 # changes with every word that a person is told.
 RUNNING = (
+    "pipeline.artifacts.digests",
+    "pipeline.asking",
     "pipeline.execution.code",
     "pipeline.execution.commands",
     "pipeline.execution.freshness",

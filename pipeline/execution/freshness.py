@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from pipeline.artifacts.publishing import file_sha256, publish_bytes
+from pipeline.artifacts.digests import content_digests
 from pipeline.config import RunConfig, section_digest
 from pipeline.execution.code import DRAWING, RUNNING, code_digests
 from pipeline.execution.packages import package_versions
@@ -184,27 +184,6 @@ def drawing_key(config: RunConfig, shown: tuple[str, ...], module: str, artifact
         machine=package_versions(module, without=RUNNING),
         inputs={"artifact": artifact.digest},
     )
-
-
-def content_digests(files: dict[str, Path], memo: Path) -> dict[str, str]:
-    """SHA-256 of each file; one unchanged in size, date and inode is not read again."""
-    try:
-        known: dict[str, Any] = json.loads(memo.read_text())
-    except (FileNotFoundError, json.JSONDecodeError):
-        known = {}
-    digests, fresh = {}, {}
-    for name, path in sorted(files.items()):
-        status = path.stat()
-        mark = [status.st_size, status.st_mtime_ns, status.st_ino]
-        remembered = known.get(str(path.resolve()))
-        if remembered is not None and remembered["mark"] == mark:
-            digests[name] = remembered["sha256"]
-        else:
-            digests[name] = file_sha256(path)
-        fresh[str(path.resolve())] = {"mark": mark, "sha256": digests[name]}
-    if any(known.get(path) != entry for path, entry in fresh.items()):
-        publish_bytes(memo, json.dumps({**known, **fresh}, indent=1, sort_keys=True).encode())
-    return digests
 
 
 def _digest(value: Any) -> str:

@@ -18,8 +18,6 @@ from loguru import logger
 
 from pipeline.artifacts import open_artifact, publish_bytes, read_provenance
 from pipeline.artifacts.publishing import CANNOT_WRITE, remove_abandoned_scratch, write_error
-from pipeline.asking.cache import QUERY_CACHE
-from pipeline.asking.expectations import Found, check_expectations
 from pipeline.errors import SoftgripError
 from pipeline.execution.commands import EXIT_FAILURE, log_to
 from pipeline.execution.executors import Executor
@@ -35,7 +33,6 @@ from pipeline.execution.staleness import (
 )
 from pipeline.interchange.foxglove_layouts import foxglove_layout
 from pipeline.stopwatch import processor_time_s
-from schemas.tables import TABLES
 
 Summary = dict[str, Any]
 Build = Callable[[StageContext], Summary]
@@ -125,7 +122,7 @@ def run_stage(
         return
     logger.info("{}: started ({} workers)", name, context.workers)
     figures = build(context)
-    context = replace(context, expected=told_expectations(context))
+    context, found = checked(context)
     if draw is not None:
         draw_recording(context, draw, figures)
     wall_s, spent_s = time.perf_counter() - started, processor_time_s() - spent_s
@@ -135,7 +132,7 @@ def run_stage(
         "wall_time_s": round(wall_s, 3),
         "recording_share": round(context.drawing.seconds / max(spent_s, CLOCK_TICK_S), 4),
         **_recording_size(context),
-        "expectations": [one.figures() for one in context.expected],
+        "expectations": found,
         **figures,
     }
     _publish_summary(context, record)
@@ -151,19 +148,29 @@ def draw_recording(context: StageContext, draw: Draw, figures: Summary) -> None:
     publish_bytes(drawing_note_path(context.folder, context.name), note)
 
 
-def told_expectations(context: StageContext) -> tuple[Found, ...]:
+def checked(context: StageContext) -> tuple[StageContext, list[dict[str, Any]]]:
     """Check what is expected at the end of the stage, and tell what does not hold."""
-    stages = {table.stage for table in TABLES}
-    made = {name: context.folder.artifact(name) for name in sorted(stages)}
-    made = {name: path for name, path in made.items() if path.is_file()}
+    # DuckDB is loaded where a stage has ended, not wherever a key is computed.
+    from pipeline.asking.cache import QUERY_CACHE
+    from pipeline.asking.expectations import as_markdown, check_expectations
+    from schemas.tables import TABLES
+
+    stages = sorted({table.stage for table in TABLES})
+    made = {name: context.folder.artifact(name) for name in stages}
     found = check_expectations(
-        context.name, context.config.expect, made, context.folder.state(QUERY_CACHE)
+        context.name,
+        context.config.expect,
+        {name: path for name, path in made.items() if path.is_file()},
+        context.folder.state(QUERY_CACHE),
     )
     for one in found:
         if one.problem:
             tell = logger.error if one.is_error else logger.warning
-            tell("{}: {}: {}. {}", context.name, one.expected.name, one.problem, one.expected.reason)
-    return tuple(found)
+            tell(
+                "{}: {}: {}. {}", context.name, one.expected.name, one.problem, one.expected.reason
+            )
+    text = as_markdown(found) if found else ""
+    return replace(context, expectations=text), [one.figures() for one in found]
 
 
 def read_summary(folder: RunFolder, stage: str) -> Summary:

@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pipeline.artifacts import Input, Provenance, package_version
-from pipeline.asking.expectations import Found, as_markdown
 from pipeline.config import RunConfig
 from pipeline.execution.executors import Executor
 from pipeline.execution.freshness import Key
@@ -126,8 +125,9 @@ class StageContext:
         Whether work runs in local processes or on a Ray cluster.
     drawing
         Processor time that the recording costs.
-    expected
-        What was expected of the finished artifact, and what was found.
+    expectations
+        What was expected of the finished artifact and what was found, Markdown; empty where nothing
+        was checked.
     """
 
     stage: Stage
@@ -140,17 +140,12 @@ class StageContext:
     mesh_dir: Path | None
     executor: Executor = "local"
     drawing: Stopwatch = field(default_factory=Stopwatch)  # what its recording costs
-    expected: tuple[Found, ...] = ()
+    expectations: str = ""
 
     @property
     def name(self) -> str:
         """The stage's name."""
         return self.stage.name
-
-    @property
-    def expectations(self) -> str:
-        """What was expected and found, as a table; empty where nothing was checked."""
-        return as_markdown(self.expected) if self.expected else ""
 
     @property
     def recording_id(self) -> str:

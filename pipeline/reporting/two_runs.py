@@ -17,12 +17,11 @@ from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder
 from pipeline.execution.staleness import built_key
 from pipeline.housekeeping.listing import disk_use_bytes
-from pipeline.messages.grasps import grasps_of
+from pipeline.messages.grasps import read_grasps
 from pipeline.messages.samples import samples_of
 from pipeline.reporting.differences import Labels
 from pipeline.reporting.facts import CatalogueFacts, read_catalogue, read_summary
 from schemas.softgrip.v1.evaluation_pb2 import Attempt
-from schemas.softgrip.v1.grasps_pb2 import GraspBatch
 from schemas.softgrip.v1.objects_pb2 import CatalogueObject
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 from schemas.softgrip.v1.scenes_pb2 import Scene
@@ -133,12 +132,11 @@ def read_labels(
     numbers = {name: number for number, name in enumerate(scenes)}
     for shard in listed_shards(grasps):
         with open_artifact(shard) as artifact:
-            for _, message in artifact.messages(GraspBatch):
-                origin, found = grasps_of(message)
+            for origin, found in read_grasps(artifact):
                 quality.append(found.quality)
                 names.append(np.array(origin.object_names)[found.object_index])
-                clutter.append(np.full(len(found), numbers[message.scene_id]))
-                levels.append(np.full(len(found), scenes[message.scene_id][0]))
+                clutter.append(np.full(len(found), numbers[origin.scene_id]))
+                levels.append(np.full(len(found), scenes[origin.scene_id][0]))
     if not quality:
         return None
     objects = np.concatenate(names)

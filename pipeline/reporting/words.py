@@ -5,9 +5,9 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.artifacts import Provenance
+from pipeline.artifacts.digests import content_digests
 from pipeline.config import RunConfig
 from pipeline.execution import RunFolder
-from pipeline.execution.freshness import content_digests
 from pipeline.reporting.facts import CatalogueFacts, licence_of_folder
 
 

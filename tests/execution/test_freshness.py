@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.artifacts.digests import content_digests
 from pipeline.config import RunConfig
 from pipeline.execution.freshness import (
     Key,
-    content_digests,
     drawing_key,
     key_from_json,
     stage_key,

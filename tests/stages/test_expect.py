@@ -13,7 +13,7 @@ from stages.expect import expect
 from stages.graph import STAGES
 
 
-@pytest.fixture()
+@pytest.fixture
 def own(run: RunFolder, tmp_path: Path) -> RunFolder:
     shutil.copytree(run.path, tmp_path / "tiny")
     return RunFolder(tmp_path / "tiny")
