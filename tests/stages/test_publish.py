@@ -10,7 +10,7 @@ import mlcroissant
 import numpy as np
 import pytest
 import torch
-from rerun.recording import load_recording
+from rerun.chunk import RrdReader
 
 from pipeline.artifacts.checksums import SUMS, verify_folder
 from pipeline.errors import ArtifactError, MachineError
@@ -60,7 +60,7 @@ def test_hugging_face_datasets_loads_the_preview(
 
 def test_rerun_loads_the_recording(published: Path) -> None:
     runpy.run_path(str(published / "load_rerun.py"))
-    assert load_recording(published / "shards.rrd").schema().entity_paths()
+    assert any(True for _ in RrdReader(published / "shards.rrd").stream())
 
 
 def test_every_example_has_five_lines_of_code(published: Path) -> None:
