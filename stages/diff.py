@@ -224,8 +224,10 @@ def draw(a: Side, b: Side, facts: dict[str, Any], text: str, into: Path) -> None
         for labels in (a.labels, b.labels):
             if labels is None:
                 continue
-            wanted = labels.groups[grouping].astype(str) == value if value else slice(None)
-            sides.append(tenths(part_of(labels, wanted)))
+            own = labels
+            if value:
+                own = part_of(labels, labels.groups[grouping].astype(str) == value)
+            sides.append(tenths(own))
         histograms[one.group] = (sides[0], sides[1])
         said = "chance may explain it" if one.is_chance else "more than chance"
         words[one.group] = f"**{one.group}**: distance {one.distance:.4f}, {said}"

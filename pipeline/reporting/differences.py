@@ -192,7 +192,8 @@ def distances(
         np.cumsum(side, axis=1) / np.maximum(side.sum(axis=1, keepdims=True), 1e-300)
         for side in (ours, theirs)
     ]
-    return np.abs(cumulative[0] - cumulative[1]).mean(axis=1)
+    areas: np.ndarray = np.abs(cumulative[0] - cumulative[1]).mean(axis=1)
+    return areas
 
 
 def _drawn_anew(

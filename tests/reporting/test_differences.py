@@ -55,11 +55,11 @@ def test_clutters_that_differ_among_themselves_are_no_difference_of_runs() -> No
     for seed in range(20):
         rng = np.random.default_rng(seed)
         means = rng.uniform(0.2, 0.8, (2, 8))
-        sides = [
+        ours, theirs = (
             labels(np.clip(np.tile(m, 50) + 0.02 * rng.normal(size=400), 0, 1), clutters=8)
             for m in means
-        ]
-        rejected += not label_distance("all", *sides, rng).is_chance
+        )
+        rejected += not label_distance("all", ours, theirs, rng).is_chance
     assert rejected <= 4  # one is expected; five and more have a chance of 3 in 1000
 
 

@@ -11,7 +11,7 @@ from pipeline.config import load_run_config
 from pipeline.control.success import Outcome
 from pipeline.errors import ArtifactError, ConfigError
 from pipeline.execution import RunFolder
-from pipeline.reporting.two_runs import Side, config_changes, object_changes, read_side
+from pipeline.reporting.two_runs import Clutter, Side, config_changes, object_changes, read_side
 from stages.diff import diff, success_changes
 from stages.graph import STAGES
 
@@ -68,14 +68,14 @@ def test_objects_that_come_go_and_change_are_named(side: Side) -> None:
 
 
 def test_success_is_paired_where_clutters_are_the_same_and_not_elsewhere(side: Side) -> None:
-    same = {("s", (str(i),)): Outcome(1, 10) for i in range(8)}
+    same: dict[Clutter, Outcome] = {("s", (str(i),)): Outcome(1, 10) for i in range(8)}
     better = {clutter: Outcome(9, 10) for clutter in same}
     ours, theirs = (replace(side, outcomes={"closed-loop": o}) for o in (same, better))
     (paired,) = success_changes(ours, theirs)
     assert (paired.paired, paired.clutters) == (True, 8)
     assert paired.rates == pytest.approx((0.1, 0.9))
     assert paired.p < 0.01
-    elsewhere = {("t", (str(i),)): Outcome(9, 10) for i in range(8)}
+    elsewhere: dict[Clutter, Outcome] = {("t", (str(i),)): Outcome(9, 10) for i in range(8)}
     (loose,) = success_changes(ours, replace(side, outcomes={"closed-loop": elsewhere}))
     assert not loose.paired
     assert loose.p < 1e-10

@@ -15,7 +15,6 @@ from rerun.chunk import RrdReader
 from pipeline.artifacts.checksums import SUMS, verify_folder
 from pipeline.errors import ArtifactError, MachineError
 from pipeline.execution import RunFolder
-from pipeline.interchange import hub
 from pipeline.interchange.hub import check_room
 from pipeline.messages.samples import read_split
 from stages.publish import publish, publish_run
@@ -123,7 +122,7 @@ def test_a_disk_too_small_is_told_before_anything_is_written(
     run: RunFolder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     usage = shutil.disk_usage(tmp_path)
-    monkeypatch.setattr(hub.shutil, "disk_usage", lambda place: usage._replace(free=1000))
+    monkeypatch.setattr(shutil, "disk_usage", lambda place: usage._replace(free=1000))
     with pytest.raises(MachineError, match="MB free, and publishing takes"):
         publish_run(run, tmp_path / "new")
     assert not (tmp_path / "new").exists()
