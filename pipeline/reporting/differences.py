@@ -100,8 +100,10 @@ def label_distances(
 
     Parameters
     ----------
-    ours, theirs
+    ours
         The labels of either run.
+    theirs
+        The same of the other run.
     rng_of
         Gives the generator for a group's name.
 
@@ -131,8 +133,10 @@ def label_distance(group: str, ours: Labels, theirs: Labels, rng: np.random.Gene
     ----------
     group
         What is compared.
-    ours, theirs
+    ours
         Labels, at least one each.
+    theirs
+        The same of the other run.
     rng
         Draws and exchanges clutters.
 
@@ -181,8 +185,10 @@ def distances(
 
     Parameters
     ----------
-    ours, theirs
+    ours
         Counts by bin, shape (n, bins).
+    theirs
+        The same of the other run.
 
     Returns
     -------
@@ -211,8 +217,10 @@ def error_change(ours: Sequence[float], theirs: Sequence[float]) -> ErrorChange 
 
     Parameters
     ----------
-    ours, theirs
+    ours
         Mean |q̂ − q| of each object, in one order.
+    theirs
+        The same of the other run.
 
     Returns
     -------
