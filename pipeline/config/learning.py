@@ -62,11 +62,6 @@ class NetworkConfig(Section):
 class TrainConfig(Section):
     """Optimisation of GA-CNN."""
 
-    start: str = Field(
-        "",
-        description="weights to begin with: 'released', or a .safetensors file beside run.toml; "
-        "without, they are drawn from the seed",
-    )
     epochs: int = Field(30, ge=1, le=10_000, description="passes over the training samples")
     batch_size: int = Field(128, ge=2, le=65536, description="samples in one step")
     learning_rate: float = Field(2e-3, gt=0, le=1, description="highest rate of the schedule")
@@ -77,6 +72,11 @@ class TrainConfig(Section):
     )
     gradient_norm_max: float = Field(1.0, gt=0, le=1e6, description="longer gradients are cut")
     patience_epochs: int = Field(15, ge=1, description="stop after so many epochs without gain")
+    start: str = Field(
+        "",
+        description="weights to begin with: 'released', or a .safetensors file beside run.toml; "
+        "without, they are drawn from the seed",
+    )
     attempts: tuple[str, ...] = Field(
         (),
         description="files of logged attempts, or folders of them, beside run.toml: what they "
