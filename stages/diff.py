@@ -16,7 +16,6 @@ import typer
 from loguru import logger
 
 from pipeline.artifacts import publish_bytes, read_provenance
-from pipeline.control.success import Outcome, advantage
 from pipeline.errors import ConfigError
 from pipeline.execution import RunFolder, generator, run_command
 from pipeline.recording.diff import blueprint, show_diff
@@ -39,6 +38,7 @@ from pipeline.reporting.two_runs import (
     read_side,
     sizes_bytes,
 )
+from pipeline.reporting.verdict import success_changes, verdict
 from pipeline.stopwatch import Stopwatch
 from stages.graph import RUNS_DIR, STAGES
 
@@ -55,31 +55,6 @@ class Recorded:
     recording_id: str
     name: str = NAME
     drawing: Stopwatch = field(default_factory=Stopwatch)
-
-
-@dataclass(frozen=True)
-class SuccessChange:
-    """One policy in both runs; paired where both tried the same clutters.
-
-    Attributes
-    ----------
-    policy
-        Its name.
-    clutters
-        How many, of both or of either.
-    paired
-        Whether both tried the same ones.
-    rates
-        Mean success over clutters, of either side.
-    p
-        Paired by clutter, or Fisher's exact test on all attempts.
-    """
-
-    policy: str
-    clutters: int
-    paired: bool
-    rates: tuple[float, float]
-    p: float
 
 
 def diff(
@@ -137,49 +112,6 @@ def compared(a: Side, b: Side) -> dict[str, Any]:
         "sizes": (sizes_bytes(a.folder, names), sizes_bytes(b.folder, names)),
         "verdict": verdict(distances, errors.p if errors else None, success),
     }
-
-
-def success_changes(a: Side, b: Side) -> list[SuccessChange]:
-    """Every policy that both runs tried, paired by clutter where the clutters are the same."""
-    found = []
-    for policy in a.outcomes:
-        if policy not in b.outcomes:
-            continue
-        mine, other = a.outcomes[policy], b.outcomes[policy]
-        same = sorted(mine.keys() & other.keys())
-        if same:
-            gain = advantage([mine[c] for c in same], [other[c] for c in same])
-            rates, p = (gain.rate, gain.baseline_rate), gain.p_paired
-        else:
-            both = [all_of(list(side.values())) for side in (mine, other)]
-            gain = advantage(both[:1], both[1:])
-            rates, p = (gain.rate, gain.baseline_rate), gain.p_fisher
-        clutters = len(same) or min(len(mine), len(other))
-        found.append(SuccessChange(policy, clutters, bool(same), rates, p))
-    return found
-
-
-def all_of(outcomes: list[Outcome]) -> Outcome:
-    """All attempts together."""
-    return Outcome(sum(o.lifted for o in outcomes), sum(o.attempts for o in outcomes))
-
-
-def verdict(distances: list[Distance], p_error: float | None, success: list[SuccessChange]) -> str:
-    """One sentence that says what is due to chance and what is not."""
-    tests = {"labels as a whole": distances[0].p if distances else None}
-    tests["errors by object"] = p_error
-    tests |= {f"success of {row.policy}": row.p for row in success}
-    told = {name: p for name, p in tests.items() if p is not None}
-    if not told:
-        return "There is too little in both to tell chance from change."
-    real = [f"{name} (p = {p:.3g})" for name, p in told.items() if p <= CHANCE]
-    chance = [f"{name} (p = {p:.3g})" for name, p in told.items() if p > CHANCE]
-    words = []
-    if real:
-        words.append(f"More than chance: {', '.join(real)}.")
-    if chance:
-        words.append(f"Chance may explain: {', '.join(chance)}.")
-    return " ".join(words)
 
 
 def summary(facts: dict[str, Any]) -> dict[str, Any]:

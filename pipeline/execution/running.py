@@ -115,6 +115,7 @@ def run_stage(
     if draw is not None and not force and artifact_is_fresh(context):
         logger.info("{}: the artifact is up to date, its recording is drawn anew", name)
         record = read_summary(context.folder, name)
+        context, _ = checked(context)
         draw_recording(context, draw, record)
         _publish_summary(context, record | _recording_size(context))
         os.utime(output)

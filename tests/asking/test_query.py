@@ -51,7 +51,7 @@ def test_a_table_holds_every_row_as_its_artifact_does(made: dict[str, Path], cac
     np.testing.assert_allclose(Rotation.from_quat(quaternion).as_matrix(), turns, atol=1e-9)
     for table in TABLES:
         (count,) = ask(f"SELECT count(*) AS n FROM {table.name}", made, cache).column("n")
-        assert count.as_py() > 0
+        assert count.as_py() > 0 or table.name == "refused"
 
 
 def test_counts_agree_with_the_messages(made: dict[str, Path], cache: Path) -> None:
@@ -153,7 +153,7 @@ def test_a_file_whose_words_are_gone_is_named(tmp_path: Path, provenance: Proven
         ("SELECT qq FROM grasps", "Columns are grasps: scene, grasp, viewpoint"),
         ("SELECT qualit FROM objects", "objects: object, split, shape_class"),
         ("SELEC q FROM grasps", "syntax error"),
-        ("SELECT * FROM gasps", "Tables are objects, scenes, placed_objects, grasps"),
+        ("SELECT * FROM gasps", "Tables are objects, refused, scenes, placed_objects, grasps"),
         ("SELECT made FROM cache", "Tables are"),
         ("SELECT status + q FROM grasps", "Columns are grasps"),
     ],

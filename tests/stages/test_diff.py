@@ -12,7 +12,8 @@ from pipeline.control.success import Outcome
 from pipeline.errors import ArtifactError, ConfigError
 from pipeline.execution import RunFolder
 from pipeline.reporting.two_runs import Clutter, Side, config_changes, object_changes, read_side
-from stages.diff import diff, success_changes
+from pipeline.reporting.verdict import success_changes
+from stages.diff import diff
 from stages.graph import STAGES
 
 

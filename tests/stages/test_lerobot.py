@@ -97,7 +97,8 @@ def test_episodes_are_the_attempts(exported: Path, attempts: list[Attempt]) -> N
         assert data["next.success"][frames][-1] == (attempt.outcome == "lifted")
         assert sum(data["next.done"][frames]) == 1
         pressure = data["observation.pressure"][frames]
-        assert max(pressure) == pytest.approx(attempt.seal_pressure, abs=1e-6)
+        # An attempt may seal several times, and tells the last one.
+        assert np.abs(np.array(pressure) - attempt.seal_pressure).min() < 1e-6
 
 
 @pytest.mark.parametrize("camera", ["wrist", "static_0"])

@@ -141,5 +141,5 @@ def test_of_what_draws_a_stage_uses_its_drawing_alone(stage: str) -> None:
         for node in ast.walk(ast.parse(source.read_text())):
             if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(DRAWING):
                 taken |= {alias.name for alias in node.names}
-    tables = {"results_markdown", "curve_markdown"} if stage == "evaluate" else set()
+    tables = {"read_tables"} if stage == "evaluate" else set()
     assert taken <= {f"draw_{stage}"} | tables
