@@ -7,7 +7,6 @@ import json
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,7 +18,7 @@ from pipeline.artifacts import publish_bytes, read_provenance
 from pipeline.errors import ConfigError
 from pipeline.execution import RunFolder, generator, run_command
 from pipeline.recording.diff import blueprint, show_diff
-from pipeline.recording.recording import recording
+from pipeline.recording.recording import OwnRecording, recording
 from pipeline.reporting.differences import (
     CHANCE,
     Distance,
@@ -39,22 +38,11 @@ from pipeline.reporting.two_runs import (
     sizes_bytes,
 )
 from pipeline.reporting.verdict import success_changes, verdict
-from pipeline.stopwatch import Stopwatch
 from stages.graph import RUNS_DIR, STAGES
 
 NAME = "diff"
 TENTHS = 10  # of [0, 1], as in all other pictures of labels
 WIDE_GROUPS = ("all", "class", "level")  # looked at one by one in the recording
-
-
-@dataclass(frozen=True)
-class Recorded:
-    """`pipeline.recording.recording.Recorded`."""
-
-    recording: Path
-    recording_id: str
-    name: str = NAME
-    drawing: Stopwatch = field(default_factory=Stopwatch)
 
 
 def diff(
@@ -166,7 +154,7 @@ def draw(a: Side, b: Side, facts: dict[str, Any], text: str, into: Path) -> None
     errors = ([row[1] for row in facts["by_object"]], [row[2] for row in facts["by_object"]])
     rates = tuple([row.rates[side] for row in facts["success"]] for side in (0, 1))
     keys = "".join(read_provenance(side.folder.artifact("objects")).key for side in (a, b))
-    recorded = Recorded(into / "diff.rrd", keys)
+    recorded = OwnRecording(NAME, into / "diff.rrd", keys)
     with recording(recorded, blueprint([s.folder.path.name for s in (a, b)])) as stream:
         show_diff(stream, histograms, words, errors, (rates[0], rates[1]), text)
 

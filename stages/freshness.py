@@ -28,7 +28,6 @@ from pipeline.execution.staleness import (
     why_stale,
 )
 from pipeline.geometry.mesh_folders import list_mesh_files
-from pipeline.geometry.parametric import PARAMETRIC_OBJECTS
 from pipeline.housekeeping.forecast import Forecast, as_lines, forecast, total_s
 from pipeline.housekeeping.listing import run_folders
 from stages.graph import EVALUATE, MADE, OBJECTS, RUNS_DIR, SHARDS, STAGES, inputs_of
@@ -122,6 +121,9 @@ def planned(folder: RunFolder, mesh_dir: Path | None, goals: list[str]) -> list[
     ConfigError
         A goal ends with no stage.
     """
+    # The embedded shapes are loaded where a plan is made, not wherever a key is computed.
+    from pipeline.geometry.parametric import PARAMETRIC_OBJECTS
+
     names = list(STAGES)
     ends = [GOALS.get(goal, goal) for goal in goals]
     if unknown := [end for end in ends if end not in STAGES]:

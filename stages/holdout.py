@@ -10,7 +10,6 @@ import json
 import os
 import sys
 import time
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -34,28 +33,17 @@ from pipeline.network.given import given_network
 from pipeline.network.samples import Samples
 from pipeline.network.sources import RELEASED, released_baseline
 from pipeline.recording.holdout import blueprint, show_holdout
-from pipeline.recording.recording import recording
+from pipeline.recording.recording import OwnRecording, recording
 from pipeline.reporting.agreement import as_csv
 from pipeline.reporting.facts import read_catalogue
 from pipeline.reporting.holdout import as_markdown
 from pipeline.reporting.page import html_page
 from pipeline.spread import choose_evenly
-from pipeline.stopwatch import Stopwatch
 from stages.graph import GIVEN_NETWORK, RUNS_DIR
 from stages.shards import gather
 
 NAME = "holdout"
 NOTE = "network.json"  # what the network was called when it was given
-
-
-@dataclass(frozen=True)
-class Recorded:
-    """`pipeline.recording.recording.Recorded`."""
-
-    recording: Path
-    recording_id: str
-    name: str = NAME
-    drawing: Stopwatch = field(default_factory=Stopwatch)
 
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
@@ -129,7 +117,7 @@ def measure(run: RunName = "default", runs_dir: RunsDir = RUNS_DIR) -> None:
     }
     publish(folder, figures, as_csv(columns))
     key = read_provenance(folder.artifact("grasps")).key
-    with recording(Recorded(folder.recording(NAME), key), blueprint()) as stream:
+    with recording(OwnRecording(NAME, folder.recording(NAME), key), blueprint()) as stream:
         shown, text = config.holdout.shown, as_markdown(figures)
         show_holdout(stream, errors, names, samples, single, shown, text)
     sys.stdout.write(text)

@@ -8,7 +8,7 @@ import json
 import os
 import sys
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -25,14 +25,13 @@ from pipeline.messages.scenes import read_placed
 from pipeline.messages.trained import SCORE_THREADS, control_predictor
 from pipeline.network.analytic import fit_analytic
 from pipeline.network.sources import RELEASED, quality_source
-from pipeline.recording.recording import recording
+from pipeline.recording.recording import OwnRecording, recording
 from pipeline.recording.referee import blueprint, show_seals, shown_seal
 from pipeline.referee import judging
 from pipeline.referee.agreement import figures_of, most_apart, varied
 from pipeline.referee.seal import referee_of
 from pipeline.reporting.agreement import as_csv, as_markdown
 from pipeline.reporting.plots import load_by_quality
-from pipeline.stopwatch import Stopwatch
 from pipeline.world.scene import PlacedObject
 from stages.evaluate import catalogue
 from stages.graph import RUNS_DIR
@@ -51,16 +50,6 @@ class SceneJob:
     varied: np.ndarray
     folder: RunFolder
     config: RunConfig
-
-
-@dataclass(frozen=True)
-class Recorded:
-    """`pipeline.recording.recording.Recorded`."""
-
-    recording: Path
-    recording_id: str
-    name: str = NAME
-    drawing: Stopwatch = field(default_factory=Stopwatch)
 
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
@@ -192,7 +181,7 @@ def show(
         borne_n = scores["borne_n"]
         shown.append(shown_seal(items, poses, int(bodies[0]), pose[0], seal, borne_n, scores))
     key = read_provenance(folder.artifact("grasps")).key
-    with recording(Recorded(folder.recording(NAME), key), blueprint()) as stream:
+    with recording(OwnRecording(NAME, folder.recording(NAME), key), blueprint()) as stream:
         show_seals(stream, shown, pad.disc, pad.fan.vacuum_pa)
 
 

@@ -64,17 +64,10 @@ def state_of(folder: RunFolder) -> str:
         return ""
     try:
         load_run_config(folder.config)
-        stale = [name for name, why in reasons(folder, mesh_dir_of(folder), made).items() if why]
+        stale = [name for name, why in reasons(folder, folder.noted_mesh_dir, made).items() if why]
     except SoftgripError as error:
         return f"cannot be made anew: {error.what}"
     return f"stale from {stale[0]} on" if stale else "up to date"
-
-
-def mesh_dir_of(folder: RunFolder) -> Path | None:
-    """The mesh folder that Make noted in a run; None for the embedded objects."""
-    note = folder.state("mesh_dir")
-    named = note.read_text().strip() if note.is_file() else ""
-    return Path(named) if named else None
 
 
 @app.command()

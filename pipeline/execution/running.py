@@ -31,7 +31,6 @@ from pipeline.execution.staleness import (
     is_fresh,
     stage_context,
 )
-from pipeline.interchange.foxglove_layouts import foxglove_layout
 from pipeline.stopwatch import processor_time_s
 
 Summary = dict[str, Any]
@@ -137,8 +136,7 @@ def run_stage(
         **figures,
     }
     _publish_summary(context, record)
-    with open_artifact(output) as artifact:
-        publish_bytes(context.folder.layout(name), foxglove_layout(artifact.counts()))
+    _publish_layout(context)
     logger.info("{}: done in {:.1f} s, {}", name, wall_s, output)
 
 
@@ -184,6 +182,15 @@ def read_summary(folder: RunFolder, stage: str) -> Summary:
 
 def _recording_size(context: StageContext) -> Summary:
     return {"recording_mb": round(context.recording.stat().st_size / 1e6, 3)}
+
+
+def _publish_layout(context: StageContext) -> None:
+    # Foxglove's messages are loaded where a stage has ended, not wherever a key is computed.
+    from pipeline.interchange.foxglove_layouts import foxglove_layout
+
+    with open_artifact(context.output) as artifact:
+        layout = foxglove_layout(artifact.counts())
+    publish_bytes(context.folder.layout(context.name), layout)
 
 
 def _publish_summary(context: StageContext, record: Summary) -> None:

@@ -88,6 +88,13 @@ class RunFolder:
         return self.path / ".state" / name
 
     @property
+    def noted_mesh_dir(self) -> Path | None:
+        """The mesh folder that Make noted in the run; None for the embedded objects."""
+        note = self.state("mesh_dir")
+        named = note.read_text().strip() if note.is_file() else ""
+        return Path(named) if named else None
+
+    @property
     def cache(self) -> Path:
         """Folder that all runs share, a run within a run too; all in it can be made again."""
         within = (self.path.parent / "run.toml").is_file()

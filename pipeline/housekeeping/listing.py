@@ -126,10 +126,10 @@ def origin(folder: RunFolder) -> str:
     """What a run's objects and network came from, in words; a run without artifacts has none."""
     if not folder.artifact("objects").is_file():
         return ""
-    note = folder.state("mesh_dir")
-    meshes = note.read_text().strip() if note.is_file() else ""
     given = read_summary(folder, "holdout").get("network")
-    return (meshes or EMBEDDED) + (f"; network {given}" if isinstance(given, str) else "")
+    return str(folder.noted_mesh_dir or EMBEDDED) + (
+        f"; network {given}" if isinstance(given, str) else ""
+    )
 
 
 def size_in_words(size_bytes: float) -> str:

@@ -20,6 +20,7 @@ import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
@@ -71,6 +72,16 @@ class Recorded(Protocol):
     @property
     def drawing(self) -> Stopwatch:
         """Counts the processor time spent on recording."""
+
+
+@dataclass(frozen=True)
+class OwnRecording:
+    """A recording of a command that is no stage; see `Recorded` for what each part is."""
+
+    name: str
+    recording: Path
+    recording_id: str
+    drawing: Stopwatch = field(default_factory=Stopwatch)
 
 
 @runtime_checkable

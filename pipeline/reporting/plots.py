@@ -5,7 +5,7 @@ dash, so that a page printed in grey still reads.
 """
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -79,34 +79,37 @@ def nsvr_scale(nsvr: Mapping[str, float], shape_class: Mapping[str, str]) -> str
 
 def label_histogram(by_split: Mapping[str, Sequence[int]]) -> str:
     """Labels by tenth of q, a bar a split."""
-    with mpl.rc_context(STYLE):
-        figure, (axes,) = _axes(1, 2.4)
-        width = 0.8 / len(by_split)
-        for number, (split, counts) in enumerate(by_split.items()):
-            x = np.arange(len(counts)) + 0.1 + width * (number + 0.5)
-            bars: dict[str, Any] = {
-                "color": _rgb(SPLIT[split]),
-                "hatch": ("", "///", "xxx")[number % 3],
-            }
-            axes.bar(x, counts, width, label=f"{split} ({sum(counts)})", ec="white", **bars)
-        axes.set_xticks(range(11), [f"{tenth / 10:.1f}" for tenth in range(11)])
-        axes.set(xlabel="grasp quality q [1]", ylabel="grasps")
-        axes.legend()
-        return _svg(figure)
+    hatches = ("", "///", "xxx")
+    styles = [
+        {"color": _rgb(SPLIT[split]), "hatch": hatches[number % len(hatches)]}
+        for number, split in enumerate(by_split)
+    ]
+    return _bars_by_tenth(by_split, by_split.values(), styles, "grasps")
 
 
 def compared_histograms(by_run: Mapping[str, Sequence[int]]) -> str:
     """Labels of several runs by tenth of q, as shares, a bar a run."""
+    shares = [np.array(counts) / max(sum(counts), 1) for counts in by_run.values()]
+    styles = [{"color": _rgb(PALETTE[number % len(PALETTE)])} for number in range(len(by_run))]
+    return _bars_by_tenth(by_run, shares, styles, "share of grasps")
+
+
+def _bars_by_tenth(
+    counts: Mapping[str, Sequence[int]],
+    heights: Iterable[Sequence[float] | np.ndarray],
+    styles: Sequence[dict[str, Any]],
+    ylabel: str,
+) -> str:
+    """Bars side by side over the tenths of q, each group named with its number of grasps."""
     with mpl.rc_context(STYLE):
         figure, (axes,) = _axes(1, 2.4)
-        width = 0.8 / len(by_run)
-        for number, (run, counts) in enumerate(by_run.items()):
-            x = np.arange(len(counts)) + 0.1 + width * (number + 0.5)
-            shares = np.array(counts) / max(sum(counts), 1)
-            colour = _rgb(PALETTE[number % len(PALETTE)])
-            axes.bar(x, shares, width, label=f"{run} ({sum(counts)})", ec="white", color=colour)
+        width = 0.8 / len(counts)
+        drawn = zip(counts.items(), heights, styles, strict=True)
+        for number, ((name, own), height, style) in enumerate(drawn):
+            x = np.arange(len(own)) + 0.1 + width * (number + 0.5)
+            axes.bar(x, height, width, label=f"{name} ({sum(own)})", ec="white", **style)
         axes.set_xticks(range(11), [f"{tenth / 10:.1f}" for tenth in range(11)])
-        axes.set(xlabel="grasp quality q [1]", ylabel="share of grasps")
+        axes.set(xlabel="grasp quality q [1]", ylabel=ylabel)
         axes.legend()
         return _svg(figure)
 

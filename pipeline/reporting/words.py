@@ -1,7 +1,6 @@
 """Sentences of a report: its headline, its meshes, and parts that do not belong together."""
 
 from collections.abc import Iterable
-from pathlib import Path
 from typing import Any
 
 from pipeline.artifacts import Provenance
@@ -54,9 +53,8 @@ def describe_meshes(
         meshes += f", and {embedded} of softgrip's embedded objects"
     if config.dataset.licence:
         return meshes, config.dataset.licence, ""
-    place = folder.state("mesh_dir")
-    mesh_dir = place.read_text() if place.is_file() else ""
-    found = licence_of_folder(Path(mesh_dir)) if mesh_dir else None
+    mesh_dir = folder.noted_mesh_dir
+    found = licence_of_folder(mesh_dir) if mesh_dir else None
     if found is None:
         return meshes, "not stated: set dataset.licence in run.toml", ""
     name, text = found
