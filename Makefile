@@ -73,8 +73,9 @@ $(STATE)/sweep.key: $(R)/shards.mcap
 .PRECIOUS: $(STATE)/%.key $(R)/%.mcap
 FORCE:
 
-status: .venv/.ready  ## what is stale, and why
+status: .venv/.ready  ## what is stale, and why; with EXECUTOR=ray what the cluster's nodes have
 	@$(PY) -m stages.freshness status
+	@$(if $(filter ray,$(EXECUTOR)),$(PY) -m stages.cluster)
 
 plan: .venv/.ready  ## what 'make GOAL' will do, about how long and how much disk: GOAL=dataset|train|eval
 	@$(PY) -m stages.freshness plan $(or $(GOAL),eval)

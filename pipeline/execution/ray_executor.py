@@ -15,16 +15,15 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
+from types import ModuleType
 from typing import Any, TypeVar
 
 from pipeline.errors import MachineError, SoftgripError
+from pipeline.execution.ray_cluster import MOST_RETRIES, connected
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-MOST_RETRIES = 5  # of an item whose node died: nodes that die so often are no cluster
-# Ray's own setting, read from the environment when Ray is loaded; by default it never gives up.
-_MEMORY_RETRIES = "RAY_task_oom_retries"
 AHEAD_PER_CPU = 2  # items in flight, so that a slow driver bounds memory
 
 
@@ -84,34 +83,27 @@ def run_on_ray(
         The worker of a job died more often than the job is tried again, and ``lost`` is not given.
     """
     named = job_by_name(job)
-    os.environ.setdefault(_MEMORY_RETRIES, str(MOST_RETRIES))
-    try:
-        import ray
-    except ImportError as error:
-        raise MachineError("Ray is not installed", "pip install 'softgrip[ray]'") from error
-    try:
-        ray.init(
-            address=os.environ.get("RAY_ADDRESS", "auto"),
-            ignore_reinit_error=True,
-            log_to_driver=False,
-        )
-    except ConnectionError as error:
-        raise MachineError(
-            f"no Ray cluster answers ({error})", "Start one with 'ray start --head'"
-        ) from error
+    with connected() as ray:
+        yield from _in_order(ray, named, items, lost)
+
+
+def _in_order(
+    ray: ModuleType,
+    named: JobByName,
+    items: Iterable[Item],
+    lost: Callable[[str], Result] | None,
+) -> Iterator[Result]:
+    """Results in the order of the items, of a bounded number of items in flight."""
     remote = ray.remote(num_cpus=1, max_retries=MOST_RETRIES)(_run_there)
-    there, program = str(Path.cwd()), _program()
+    there, program = str(Path.cwd()), program_name()
     ahead = AHEAD_PER_CPU * max(1, int(ray.cluster_resources().get("CPU", 1)))
     waiting: deque[Any] = deque()
-    try:
-        for item in items:
-            waiting.append(remote.remote(pickle.dumps((named, item)), there, program))
-            if len(waiting) >= ahead:
-                yield _result(waiting.popleft(), program, lost)
-        while waiting:
+    for item in items:
+        waiting.append(remote.remote(pickle.dumps((named, item)), there, program))
+        if len(waiting) >= ahead:
             yield _result(waiting.popleft(), program, lost)
-    finally:
-        ray.shutdown()
+    while waiting:
+        yield _result(waiting.popleft(), program, lost)
 
 
 def _result(sent: Any, program: str, lost: Callable[[str], Any] | None) -> Any:
@@ -120,7 +112,7 @@ def _result(sent: Any, program: str, lost: Callable[[str], Any] | None) -> Any:
     from ray.exceptions import OutOfMemoryError, RayTaskError, WorkerCrashedError
 
     try:
-        return _unpickled(ray.get(sent), {program: "__main__"})
+        return unpickled(ray.get(sent), {program: "__main__"})
     except RayTaskError as error:
         raise error.cause from error
     except (OutOfMemoryError, WorkerCrashedError) as error:
@@ -163,7 +155,7 @@ def job_by_name(job: Callable[[Item], Result]) -> JobByName:
             "Define it at the top level of a module",
         )
     if module == "__main__":
-        module = _program()
+        module = program_name()
         if module == "__main__":
             raise MachineError(
                 "a script's own function cannot run on a cluster", "Run it with python -m"
@@ -171,10 +163,18 @@ def job_by_name(job: Callable[[Item], Result]) -> JobByName:
     return JobByName(module, name, before, keywords)
 
 
-def _program() -> str:
+def program_name() -> str:
     """Name of the module that ``python -m`` runs as ``__main__``; it has that name on a node."""
     spec = getattr(sys.modules["__main__"], "__spec__", None)
     return "__main__" if spec is None else str(spec.name)
+
+
+class Worker:
+    """A process on a node that works on one item after the other."""
+
+    def run(self, sent: bytes, folder: str, program: str) -> bytes:
+        """On the node: as `_run_there`."""
+        return _run_there(sent, folder, program)
 
 
 def _run_there(sent: bytes, folder: str, program: str) -> bytes:
@@ -199,11 +199,11 @@ def _run_there(sent: bytes, folder: str, program: str) -> bytes:
     os.chdir(folder)
     if folder not in sys.path:
         sys.path.insert(0, folder)
-    job, item = _unpickled(sent, {"__main__": program})
+    job, item = unpickled(sent, {"__main__": program})
     return pickle.dumps(job(item))
 
 
-def _unpickled(data: bytes, renamed: dict[str, str]) -> Any:
+def unpickled(data: bytes, renamed: dict[str, str]) -> Any:
     """What was pickled by another process of this run, with modules by their names here."""
 
     class Unpickler(pickle.Unpickler):

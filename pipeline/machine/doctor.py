@@ -23,6 +23,8 @@ from pipeline.sensing.sapien_rendering import render_table
 seen = render_table(ScenesConfig(), static_cameras(StaticCameraConfig())[0])
 raise SystemExit(0 if (seen.depth_m > 0).any() else "the table is not in the picture")
 """
+CLUSTER = "stages.cluster"  # looks at each node, in a process of its own
+CLUSTER_TIMEOUT_S = 300  # every node tries its renderer
 TRIAL_TIMEOUT_S = 120  # a first picture compiles shaders; a driver that hangs takes no longer
 
 
@@ -113,6 +115,29 @@ def check_rendering() -> Finding:
     return Finding("SAPIEN", f"does not render: {last}", "see the Vulkan driver above")
 
 
+def check_cluster() -> Finding:
+    """Check the nodes of the Ray cluster that RAY_ADDRESS names, in a process of its own."""
+    address = os.environ.get("RAY_ADDRESS")
+    if not address:
+        return Finding("cluster", "none: RAY_ADDRESS names none")
+    command = [sys.executable, "-m", CLUSTER]
+    try:
+        looked = subprocess.run(
+            command,
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=CLUSTER_TIMEOUT_S,
+        )
+    except subprocess.TimeoutExpired:
+        return Finding("cluster", f"{address} does not answer", f"see '{' '.join(command)}'")
+    said = (looked.stdout.strip() or looked.stderr.strip()).removeprefix("cluster: ")
+    if looked.returncode == 0:
+        return Finding("cluster", said)
+    return Finding("cluster", said, "give every node this project, these packages and this driver")
+
+
 def check_room() -> Finding:
     """Check the number of cores and the free disk space."""
     free_gib = shutil.disk_usage(ROOT).free / 2**30
@@ -128,6 +153,7 @@ CHECKS: tuple[Callable[[], Finding], ...] = (
     check_readers,
     check_driver,
     check_rendering,
+    check_cluster,
     check_room,
 )
 

@@ -60,6 +60,10 @@ REDUCED = {
         "make -n calibrate RUN=ci",
         "the tiny run has too few samples; tests/stages/test_calibrate.py runs it",
     ),
+    "make status RUN=ci EXECUTOR=ray": (
+        "make -n status RUN=ci EXECUTOR=ray",
+        "it needs a cluster; tests/stages/test_cluster.py runs it on one",
+    ),
     "make referee RUN=unseen MESH_DIR=meshes": (
         "make -n referee RUN=unseen MESH_DIR=meshes",
         "half an hour; tests/stages/test_referee.py judges a few grasps",

@@ -39,7 +39,7 @@ def test_a_job_travels_with_its_arguments(job: Callable[[str], str], made: str) 
 PROGRAM = """
 import pickle
 from dataclasses import dataclass
-from pipeline.execution.ray_executor import _program, _unpickled, job_by_name
+from pipeline.execution.ray_executor import job_by_name, program_name, unpickled
 
 @dataclass(frozen=True)
 class Item:
@@ -52,9 +52,9 @@ def job(item):
 if __name__ == "__main__":
     sent = pickle.dumps((job_by_name(job), Item(1)))
     import program  # a second time, as a node does: its classes are others
-    named, item = _unpickled(sent, {"__main__": _program()})
+    named, item = unpickled(sent, {"__main__": program_name()})
     assert isinstance(item, program.Item) and not isinstance(item, Item)
-    result = _unpickled(pickle.dumps(named(item)), {_program(): "__main__"})
+    result = unpickled(pickle.dumps(named(item)), {program_name(): "__main__"})
     assert result == Item(2), result
     print("done")
 """

@@ -79,3 +79,21 @@ def test_the_printed_command_writes_the_source_that_installing_writes(
     written, _, _ = first.partition(" | ")
     said = subprocess.run(["/bin/sh", "-c", written], capture_output=True, text=True, check=True)
     assert said.stdout == source
+
+
+def test_without_a_cluster_none_is_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("RAY_ADDRESS", raising=False)
+    assert doctor.check_cluster().remedy == ""
+
+
+def test_what_a_cluster_lacks_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    program = (
+        "import sys; print('cluster: 1 of 2 nodes can'); print('  b: other files'); sys.exit(1)"
+    )
+    (tmp_path / "looked.py").write_text(program)
+    monkeypatch.setenv("RAY_ADDRESS", "10.0.0.1:6379")
+    monkeypatch.setattr(doctor, "ROOT", tmp_path)
+    monkeypatch.setattr(doctor, "CLUSTER", "looked")
+    finding = doctor.check_cluster()
+    assert finding.state.splitlines() == ["1 of 2 nodes can", "  b: other files"]
+    assert "this driver" in finding.remedy

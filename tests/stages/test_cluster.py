@@ -74,3 +74,13 @@ def test_six_stages_from_cold_write_the_bytes_of_local_processes_though_a_node_d
     )
     assert judged.returncode == 0, judged.stderr[-3000:]
     assert digests(folder) == digests(run)
+    told = subprocess.run(
+        ["make", "status", "RUN=ci", "EXECUTOR=ray"],
+        cwd=copy,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert told.returncode == 0, told.stderr[-3000:]
+    assert "cluster: 1 of 1 nodes can do this run's work, on 1 cores" in told.stdout

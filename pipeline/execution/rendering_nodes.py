@@ -1,0 +1,147 @@
+"""Work items that render: one process a node, for a graphics driver keeps a GPU or all cores busy.
+
+Local processes: this one. On a Ray cluster: one process on every node that renders with what the
+driver renders with, so that the bytes are the same. Other nodes are told and get no such item.
+"""
+
+import pickle
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any, TypeVar
+
+from loguru import logger
+
+from pipeline.config.cameras import RendererName
+from pipeline.errors import SoftgripError
+from pipeline.execution.executors import Executor
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+
+AHEAD_PER_NODE = 2  # items that a node holds: one renders while the next is on its way
+
+
+def run_on_rendering_nodes(
+    job: Callable[[Item], Result],
+    items: Iterable[Item],
+    executor: Executor,
+    renderer: RendererName,
+) -> Iterator[Result]:
+    """Compute ``job(item)`` for every item, where there is a renderer.
+
+    Parameters
+    ----------
+    job
+        A module-level function of one item, which keeps its renderer from call to call.
+    items
+        Picklable values.
+    executor
+        Local processes, or a Ray cluster.
+    renderer
+        The renderer that the configuration asks for.
+
+    Yields
+    ------
+    Result
+        Result of each item, in the order of the items.
+
+    Raises
+    ------
+    SoftgripError
+        Every node that could render is lost.
+    """
+    if executor == "local":
+        yield from map(job, items)
+        return
+    from pipeline.execution.ray_cluster import Node, cluster_nodes, connected, what_is_here
+    from pipeline.execution.ray_executor import job_by_name  # Ray is an optional package
+
+    named = job_by_name(job)
+    with connected() as ray:
+        able: list[Node] = []
+        modules = [named.module]
+        for node in cluster_nodes(what_is_here(modules, renderer), modules, renderer):
+            if node.lacks:
+                logger.warning("node {} renders nothing: {}", node.name, "; ".join(node.lacks))
+            else:
+                able.append(node)
+        if not able:
+            logger.warning("no node of the cluster renders as this driver does: it renders itself")
+            yield from map(job, items)
+            return
+        processes = [_Process(node.name, _started(ray, node.node_id)) for node in able]
+        try:
+            yield from _in_order(ray, named, items, processes)
+        finally:
+            for process in processes:
+                ray.kill(process.actor)
+
+
+@dataclass(eq=False)
+class _Process:
+    """A node's process that renders, and the number of items that it holds."""
+
+    node: str
+    actor: Any
+    holds: int = 0
+
+
+def _started(ray: ModuleType, node_id: str) -> Any:
+    """An actor on a node. It asks for no CPU: a renderer shares its node's with other jobs."""
+    from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
+
+    from pipeline.execution.ray_executor import Worker
+
+    there = NodeAffinitySchedulingStrategy(node_id, soft=False)
+    return ray.remote(num_cpus=0, scheduling_strategy=there)(Worker).remote()
+
+
+def _in_order(
+    ray: ModuleType, job: Any, items: Iterable[Any], processes: Sequence[_Process]
+) -> Iterator[Any]:
+    """Results in the order of the items; items of a process that is lost go to another."""
+    from pipeline.execution.ray_executor import program_name, unpickled
+
+    program, there, living = program_name(), str(Path.cwd()), list(processes)
+    waiting: deque[tuple[bytes, _Process, Any]] = deque()
+
+    def send(item: bytes) -> None:
+        chosen = min(living, key=lambda process: process.holds)
+        chosen.holds += 1
+        waiting.append((item, chosen, chosen.actor.run.remote(item, there, program)))
+
+    def next_result() -> Any:
+        while True:
+            item, process, ref = waiting.popleft()
+            process.holds -= 1
+            try:
+                return unpickled(ray.get(ref), {program: "__main__"})
+            except ray.exceptions.RayTaskError as error:
+                raise error.cause from error
+            except ray.exceptions.RayActorError as error:
+                if process in living:
+                    living.remove(process)
+                    logger.warning("node {} renders no more: {}", process.node, _first_line(error))
+                if not living:
+                    raise SoftgripError(
+                        "Every node of the Ray cluster that renders is lost",
+                        "Run the same command again, it goes on where it stopped",
+                    ) from error
+                chosen = min(living, key=lambda process: process.holds)
+                chosen.holds += 1
+                ref = chosen.actor.run.remote(item, there, program)
+                waiting.appendleft((item, chosen, ref))
+
+    for item in items:
+        send(pickle.dumps((job, item)))
+        if len(waiting) >= AHEAD_PER_NODE * len(living):
+            yield next_result()
+    while waiting:
+        yield next_result()
+
+
+def _first_line(error: Exception) -> str:
+    return (str(error).strip().splitlines() or ["no reason given"])[0]
