@@ -3,7 +3,6 @@
 import json
 import os
 import platform
-import socket
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -63,8 +62,6 @@ class Found:
 
     Attributes
     ----------
-    host
-        The machine's name.
     code
         Path → SHA-256 of our source files.
     packages
@@ -73,7 +70,6 @@ class Found:
         What the machine renders with.
     """
 
-    host: str
     code: dict[str, str]
     packages: dict[str, str]
     renderer: str
@@ -166,7 +162,7 @@ def what_is_here(modules: Sequence[str], asked: RendererName) -> Found:
 
     Returns
     -------
-    The host, our source files, packages and the renderer.
+    Our source files, packages and the renderer.
 
     Raises
     ------
@@ -179,7 +175,7 @@ def what_is_here(modules: Sequence[str], asked: RendererName) -> Found:
         code |= code_digests(module)
         packages |= package_versions(module)
     memo = Path(tempfile.gettempdir()) / f"softgrip-{os.getuid()}" / "renderer.json"
-    return Found(socket.gethostname(), code, packages, identify_renderer(asked, memo))
+    return Found(code, packages, identify_renderer(asked, memo))
 
 
 def what_is_lacking(here: Found, there: Found) -> tuple[str, ...]:
@@ -220,15 +216,17 @@ def _first(names: Sequence[str]) -> str:
 
 def _node(node: dict[str, Any], answer: Found | str, here: Found) -> Node:
     """What Ray knows of a node, with what the node says itself."""
-    found = isinstance(answer, Found)
-    host = answer.host if isinstance(answer, Found) else node["NodeManagerHostname"]
+    if isinstance(answer, Found):
+        renderer, lacks = answer.renderer, what_is_lacking(here, answer)
+    else:
+        renderer, lacks = "", (answer,)
     return Node(
         node_id=node["NodeID"],
-        name=f"{host} {node['NodeManagerAddress']}",
+        name=f"{node['NodeManagerHostname']} {node['NodeManagerAddress']}",
         cpus=int(node["Resources"]["CPU"]),
         memory_gib=node["Resources"].get("memory", 0.0) / 2**30,
-        renderer=answer.renderer if found else "",
-        lacks=what_is_lacking(here, answer) if found else (str(answer),),
+        renderer=renderer,
+        lacks=lacks,
     )
 
 

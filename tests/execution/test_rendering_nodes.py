@@ -19,18 +19,18 @@ from pipeline.execution.ray_cluster import (
 from pipeline.execution.rendering_nodes import run_on_rendering_nodes
 
 cluster_utils = pytest.importorskip("ray.cluster_utils", reason="Ray is not installed")
-HERE = Found("a", {"pipeline/x.py": "1"}, {"python": "3.11.7", "numpy": "2"}, "Embree rays")
+HERE = Found({"pipeline/x.py": "1"}, {"python": "3.11.7", "numpy": "2"}, "Embree rays")
 OBJECT_STORE_BYTES = 10**8
 MODULES = ["pipeline.execution.code"]
 
 
 def test_a_node_like_the_driver_lacks_nothing() -> None:
-    there = Found("b", HERE.code, HERE.packages | {"black": "1"}, HERE.renderer)
+    there = Found(HERE.code, HERE.packages | {"black": "1"}, HERE.renderer)
     assert what_is_lacking(HERE, there) == ()
 
 
 def test_what_a_node_lacks_is_named() -> None:
-    there = Found("b", {"pipeline/y.py": "1"}, {"python": "3.12.1"}, "SAPIEN, llvmpipe")
+    there = Found({"pipeline/y.py": "1"}, {"python": "3.12.1"}, "SAPIEN, llvmpipe")
     code, packages, renderer = what_is_lacking(HERE, there)
     assert "pipeline/x.py, pipeline/y.py" in code
     assert "python 3.12.1 (here 3.11.7), numpy not installed (here 2)" in packages
@@ -38,7 +38,7 @@ def test_what_a_node_lacks_is_named() -> None:
 
 
 def test_of_many_differences_a_few_are_shown() -> None:
-    there = Found("b", {f"pipeline/{n}.py": "1" for n in range(9)} | HERE.code, HERE.packages, "")
+    there = Found({f"pipeline/{n}.py": "1" for n in range(9)} | HERE.code, HERE.packages, "")
     assert "and 6 more" in what_is_lacking(HERE, there)[0]
 
 
