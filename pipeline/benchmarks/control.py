@@ -4,6 +4,7 @@ import time
 
 import numpy as np
 
+from pipeline.benchmarks import sealing
 from pipeline.benchmarks.clock import quantiles_ms
 from pipeline.benchmarks.inference import sized_network
 from pipeline.config import RunConfig
@@ -23,7 +24,7 @@ STEPS = 60  # enough for a 95th percentile
 
 
 def figures(scene: ClutterScene, meshes: dict[str, Mesh], config: RunConfig) -> dict[str, object]:
-    """The closed loop's step with the network at its full size; its weights change no time."""
+    """The closed loop's step with the network at its full size, and the referee's seals."""
     _, network = sized_network(config.network, config.sensing.grid_cells)
     found = step_ms(scene, meshes, network, config, STEPS)
     rounded = {
@@ -36,6 +37,7 @@ def figures(scene: ClutterScene, meshes: dict[str, Mesh], config: RunConfig) -> 
         "control_step_with_picture_ms": rounded["with the picture"],
         "control_candidates": config.evaluate.policy.local_candidates,
         "control_layers": config.network.layers,
+        **sealing.figures(scene, meshes, config),
     }
 
 
