@@ -7,7 +7,6 @@ torques about x, y (the wrench of pipeline/gripper/wrench has four rows).
 
 from collections import Counter
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -25,13 +24,12 @@ from pipeline.execution import (
     stage_command,
 )
 from pipeline.execution.items import GRASP_COUNTS, item_key, items_basis
-from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.labelling.balancing import quality_histogram
 from pipeline.labelling.grasps import LabelledGrasps
 from pipeline.labelling.scene import label_scene, noise_draws, scene_surfaces
 from pipeline.labelling.shown_pads import SHOWN_SCENES, ShownPads, drape_again
 from pipeline.messages.grasps import PADS_TOPIC, pads_message, read_grasps, write_grasps
-from pipeline.messages.objects import read_objects
+from pipeline.messages.objects import catalogue
 from pipeline.messages.scenes import read_scene, scene_count
 from pipeline.recording.grasps import draw_grasps
 from pipeline.spread import choose_evenly
@@ -128,12 +126,6 @@ def draped_pads(
     quality = np.concatenate([batch.quality for batch in grasps])
     chosen = np.argsort(quality, kind="stable")[choose_evenly(len(quality), pads)]
     return drape_again(grasps, chosen, surfaces, config)
-
-
-@lru_cache(maxsize=1)
-def catalogue(objects: Path) -> dict[str, tuple[CatalogueObject, str]]:
-    """The object catalogue, read once a worker."""
-    return read_objects(objects)
 
 
 def examined(shard: Path) -> ShardResult:

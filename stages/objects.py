@@ -20,16 +20,11 @@ from pipeline.execution import (
     progress,
     stage_command,
 )
-from pipeline.execution.items import with_object_keys
+from pipeline.execution.items import item_key, object_key, objects_basis
 from pipeline.execution.left_out import LeftOut
 from pipeline.geometry.catalogue import CatalogueObject, MeasuredObject
 from pipeline.geometry.families import DeclaredFamily, read_declared
-from pipeline.geometry.intake import (
-    Source,
-    all_sources,
-    finished_or_why_not,
-    measured_or_why_not,
-)
+from pipeline.geometry.intake import Source, all_sources, finished_or_why_not, measured_or_why_not
 from pipeline.geometry.masses import mass_of, read_masses
 from pipeline.geometry.mesh_folders import FAMILIES_FILE, MASSES_FILE
 from pipeline.geometry.plan import Plan, plan_catalogue
@@ -41,7 +36,7 @@ from pipeline.geometry.random_solids.catalogued import (
 from pipeline.geometry.selection import Split
 from pipeline.geometry.settled import SETTLED_FILE, read_settled
 from pipeline.geometry.stretching import stretched_for_training
-from pipeline.messages.objects import REFUSED_TOPIC, TOPIC, object_message
+from pipeline.messages.objects import REFUSED_TOPIC, TOPIC, object_message, objects_by_key
 from pipeline.recording.objects import draw_objects
 from schemas.softgrip.v1.objects_pb2 import RefusedMesh
 from stages.graph import OBJECTS, inputs_of
@@ -61,10 +56,11 @@ def build(stage: StageContext) -> Summary:
         settled=read_settled(settled_in, settling_basis(stage)),
     )
     left_out, most = LeftOut(), Allowance(config.max_seconds, config.max_memory_mib)
+    former = objects_by_key(stage.output)
     with Isolation(stage.workers, most, stage.executor) as apart:
         measured = measure(stage, jobs, apart, left_out)
-        plan, objects = finish(stage, measured, planned, apart, left_out)
-        solids = random_solids(stage, plan, apart, left_out)
+        plan, objects = finish(stage, measured, planned, apart, left_out, former)
+        solids = random_solids(stage, plan, apart, left_out, former)
     for source, why in plan.left_out:
         left_out.add(source, why)
     rng_of = partial(generator, seed, "object")
@@ -72,7 +68,7 @@ def build(stage: StageContext) -> Summary:
     solids, solids_near = solids_for_training(solids, plan, threshold)
     objects += solids
     stretched, near = stretched_for_training(objects, plan, config, rng_of, threshold)
-    objects += stretched
+    objects += [replace(item, key=item_key(item.key, copy=item.name)) for item in stretched]
     split: dict[str, Split] = dict.fromkeys((item.name for item in objects), "train")
     split |= plan.split
     publish_bytes(settled_in, plan.settled.to_json().encode())
@@ -80,13 +76,14 @@ def build(stage: StageContext) -> Summary:
         logger.warning("{}", remark)
     publish(stage, objects, split, left_out)
     figures = {"stretched_near_held_out": near, "solids_near_held_out": solids_near, **plan.figures}
+    taken_over = sum(item.key in former for item in objects[: len(objects) - len(stretched)])
+    figures |= {"taken_over": taken_over, "made": len(objects) - taken_over}
     return summary(objects, split, left_out.refused) | figures
 
 
 def settling_basis(stage: StageContext) -> str:
     """What settled splits rest on: with another seed or way of splitting, all are split anew."""
-    sections = ("seed", "split", "objects.embedded_in_training")
-    return section_digest(stage.config, sections)
+    return section_digest(stage.config, ("seed", "split", "objects.embedded_in_training"))
 
 
 def declared_families(stage: StageContext) -> tuple[DeclaredFamily, ...]:
@@ -110,15 +107,23 @@ def measure(
 
 
 def random_solids(
-    stage: StageContext, plan: Plan, apart: Isolation, left_out: LeftOut
+    stage: StageContext,
+    plan: Plan,
+    apart: Isolation,
+    left_out: LeftOut,
+    former: Mapping[str, CatalogueObject],
 ) -> list[CatalogueObject]:
-    """Solids drawn from the seed; their shapes are nobody's."""
+    """Solids drawn from the seed; their shapes are nobody's. Those made before are taken over."""
     config, cache = stage.config.objects, stage.folder.cache / "convex_parts"
-    names = solid_names(config.random_solids, plan.measured)
+    basis = objects_basis(stage.key, stage.config)
+    keys = {n: item_key(basis, solid=n) for n in solid_names(config.random_solids, plan.measured)}
+    names = [name for name, key in keys.items() if key not in former]
     job = partial(solid_or_why_not, config=config, cache=cache)
     results = apart.run_in_order(job, [(n, generator(stage.config.seed, n)) for n in names])
     shown = progress(results, len(names), "objects: random solids", "solid")
-    return left_out.sifted(names, shown)
+    made = {keys[i.name]: replace(i, key=keys[i.name]) for i in left_out.sifted(names, shown)}
+    there = {**former, **made}
+    return [there[key] for key in keys.values() if key in there]
 
 
 def finish(
@@ -127,37 +132,35 @@ def finish(
     planned: Callable[[Sequence[MeasuredObject]], Plan],
     apart: Isolation,
     left_out: LeftOut,
+    former: Mapping[str, CatalogueObject],
 ) -> tuple[Plan, list[CatalogueObject]]:
-    """Size, weigh and cut into convex parts what is taken; plan anew without what cannot be cut."""
+    """Size, weigh and cut into convex parts what is taken; plan anew without what cannot be cut.
+
+    What was finished before, by its key, is taken over.
+    """
     config, cache = stage.config.objects, stage.folder.cache / "convex_parts"
     job = partial(finished_or_why_not, config=config, cache=cache)
     rng_of = partial(generator, stage.config.seed, "object")
     masses = read_masses(path) if (path := stage.inputs.get(MASSES_FILE)) else {}
-    plan = planned(measured)
-    done: dict[tuple[str, ...], CatalogueObject] = {}
-    while todo := [item for item in plan.taken if known_as(item) not in done]:
+    key_of = partial(object_key, objects_basis(stage.key, stage.config), masses=masses)
+    plan, done = planned(measured), dict(former)
+    while todo := [item for item in plan.taken if key_of(item) not in done]:
         drawn = [(i, rng_of(i.content), mass_of(i.source.name, masses)) for i in todo]
         results = apart.run_in_order(job, drawn)
+        shown = progress(results, len(todo), "objects: convex parts", "object")
         failed = set()
-        for item, result in zip(
-            todo, progress(results, len(todo), "objects: convex parts", "object"), strict=True
-        ):
+        for item, result in zip(todo, shown, strict=True):
             if isinstance(result, MeshError | Lost):
                 left_out.add(item.origin, result)
                 failed.add(item.origin)
             else:
-                done[known_as(item)] = result
+                done[key_of(item)] = replace(result, key=key_of(item))
         if failed:
             measured = [item for item in measured if item.origin not in failed]
             plan = planned(measured)
     of, copies = plan.families.of, plan.copies
-    made = [done[known_as(item)] for item in plan.taken]
+    made = [done[key_of(item)] for item in plan.taken]
     return plan, [replace(i, family=of[i.name], copies=copies.get(i.name, ())) for i in made]
-
-
-def known_as(item: MeasuredObject) -> tuple[str, ...]:
-    """What an object is finished with: name and unit may be others in a plan without a mesh."""
-    return item.origin, item.source.name, item.source.unit
 
 
 def publish(
@@ -167,9 +170,8 @@ def publish(
     left_out: LeftOut,
 ) -> None:
     """Write the artifact."""
-    keyed = with_object_keys(objects, stage.key, stage.config)
     with ArtifactWriter(stage.output, stage.provenance(left_out.cut_short)) as artifact:
-        for index, item in enumerate(keyed):
+        for index, item in enumerate(objects):
             artifact.write(TOPIC, object_message(item, split[item.name]), log_time_ns=index)
         for index, message in enumerate(left_out.refused):
             artifact.write(REFUSED_TOPIC, message, log_time_ns=index)

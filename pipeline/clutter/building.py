@@ -1,6 +1,6 @@
 """A clutter of a level: built, settled, measured, and refused unless it meets its definition."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from jaxtyping import Float
@@ -9,6 +9,7 @@ from pipeline.clutter.dropping import drop_again, drop_pile, resting_pose
 from pipeline.clutter.gaps import Surface, nearest_gaps_m, pairwise_gaps_m, penetration_m
 from pipeline.clutter.levels import Distribution, level_of
 from pipeline.clutter.placement import place_isolated, place_multiple
+from pipeline.clutter.settled import SettledClutter, generator_at, standing
 from pipeline.config.scenes import ScenesConfig
 from pipeline.errors import SceneError
 from pipeline.geometry.catalogue import CatalogueObject
@@ -27,11 +28,13 @@ def build_clutter(
     pool: Sequence[CatalogueObject],
     config: ScenesConfig,
     seed: int,
+    settled: SettledClutter | None = None,
 ) -> ClutterScene:
     """A clutter of ``objects_per_clutter`` objects from ``pool``, without views yet.
 
     Each object is drawn as often as any other, give or take one. A clutter that misses its
-    level's definition is drawn again, at most ``placement_attempts`` times.
+    level's definition is drawn again, at most ``placement_attempts`` times. One that was built
+    before is built again of its members, whatever other objects there are today.
 
     Parameters
     ----------
@@ -47,6 +50,8 @@ def build_clutter(
         Section scenes of the run.
     seed
         Of everything that is drawn.
+    settled
+        What it is built of again; all members are in the pool.
 
     Returns
     -------
@@ -58,10 +63,9 @@ def build_clutter(
         No attempt met the definition; the last reason is in the message.
     """
     _, distribution = level_of(level)
-    rng = np.random.Generator(np.random.PCG64(seed))
     reason = "none was tried"
-    for _ in range(config.placement_attempts):
-        items = draw_items(pool, config.objects_per_clutter, rng)
+    for items, rng in _draws(pool, config, seed, settled):
+        stood = standing(rng)
         try:
             if distribution is Distribution.STACKED:
                 poses, settle_time_s = _settle_pile(items, config, rng)
@@ -87,11 +91,27 @@ def build_clutter(
             ),
             settle_time_s=settle_time_s,
             views=(),
+            generator=stood,
         )
     raise SceneError(
         f"{scene_id}: no clutter of level {level} in {config.placement_attempts} tries: {reason}",
         "Raise scenes.placement_attempts, or lower scenes.objects_per_clutter",
     )
+
+
+def _draws(
+    pool: Sequence[CatalogueObject],
+    config: ScenesConfig,
+    seed: int,
+    settled: SettledClutter | None,
+) -> Iterator[tuple[list[CatalogueObject], np.random.Generator]]:
+    """Objects to try a clutter of, and the generator for the rest: first those settled before."""
+    if settled:
+        by_key = {item.key: item for item in pool}
+        yield [by_key[key] for key in settled.members], generator_at(seed, settled.generator)
+    rng = np.random.Generator(np.random.PCG64(seed))
+    for _ in range(config.placement_attempts):
+        yield draw_items(pool, config.objects_per_clutter, rng), rng
 
 
 def draw_items(

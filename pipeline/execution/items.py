@@ -9,13 +9,18 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from pipeline.clutter.settled import SettledClutter, settled_by
 from pipeline.config import RunConfig, section_digest
 from pipeline.execution.freshness import Key
-from pipeline.geometry.catalogue import CatalogueObject
+from pipeline.geometry.catalogue import CatalogueObject, MeasuredObject
+from pipeline.geometry.masses import mass_of
 from pipeline.world.scene import ClutterScene
 
 # What says how many items there are, which is no property of any.
-OBJECT_COUNTS = ("objects.limit", "objects.embedded_in_training", "objects.stretched_copies")
+OBJECT_COUNTS = (
+    *("objects.limit", "objects.embedded_in_training"),
+    *("objects.stretched_copies", "objects.random_solids"),
+)
 SCENE_COUNTS = (
     *("scenes.levels", "scenes.clutters_per_level", "scenes.splits", "scenes.impossible"),
     "scenes.test_seed",  # in the seed of each scene that it decides
@@ -46,39 +51,34 @@ def items_basis(
     return _digest([section_digest(config, sections, besides), key.code, key.machine])
 
 
-def with_object_keys(
-    items: Sequence[CatalogueObject], key: Key, config: RunConfig
-) -> list[CatalogueObject]:
-    """Objects with their keys; split, family and copies depend on other objects and do not count.
+def objects_basis(key: Key, config: RunConfig) -> str:
+    """What all objects of stage objects, whose key is given, rest on."""
+    return items_basis(key, config, ("seed", "objects"), OBJECT_COUNTS)
+
+
+def object_key(basis: str, item: MeasuredObject, masses: Mapping[str, float]) -> str:
+    """Key of an object, which may not be finished yet.
+
+    Split, family and copies depend on other objects, and do not count.
 
     Parameters
     ----------
-    items
-        The objects of a catalogue.
-    key
-        Of stage objects.
-    config
-        The run's configuration.
+    basis
+        What all objects rest on, by `objects_basis`.
+    item
+        The object at its own size.
+    masses
+        Name, with * and ?, → mass of the object at that size [kg]; of others density is drawn.
 
     Returns
     -------
-    The same objects, each with its key.
+    The digest, as hex.
     """
-    basis = items_basis(key, config, ("seed", "objects"), OBJECT_COUNTS)
-    return [
-        replace(
-            item,
-            key=item_key(
-                basis,
-                content=item.content,
-                name=item.name,
-                unit=item.unit,
-                mass_kg=item.mass_kg,
-                stretch=item.stretch.tolist(),
-            ),
-        )
-        for item in items
-    ]
+    source = item.source
+    named = {"name": source.name, "source": source.label, "unit": source.unit}
+    mass_kg = mass_of(source.name, masses)
+    weighed = {} if mass_kg is None else {"mass_kg": mass_kg}
+    return item_key(basis, content=item.content, **named, **weighed)
 
 
 def scenes_basis(key: Key, config: RunConfig) -> str:
@@ -104,8 +104,27 @@ def with_scene_key(
     -------
     The same scene with its key.
     """
-    keys = [item.key for item in pool]
-    return replace(scene, key=item_key(basis, scene=scene.scene_id, seed=scene.seed, pool=keys))
+    settled = settled_by(scene, {item.name: item.key for item in pool})
+    return replace(scene, key=scene_key(basis, scene.scene_id, settled))
+
+
+def scene_key(basis: str, scene_id: str, settled: SettledClutter) -> str:
+    """Key of a scene, which may not be made yet: of its number and its members.
+
+    Parameters
+    ----------
+    basis
+        What all scenes rest on, by `scenes_basis`.
+    scene_id
+        Its name: level, split and number.
+    settled
+        What it is built of.
+
+    Returns
+    -------
+    The digest, as hex.
+    """
+    return item_key(basis, scene=scene_id, **vars(settled))
 
 
 def item_key(basis: str, **parts: str | float | Sequence[str] | Sequence[float]) -> str:

@@ -113,7 +113,8 @@ def plan_catalogue(
     if not classes:
         raise MeshError("Not one mesh could be used", "See the reasons above, or unset MESH_DIR")
     check_transparent(config, sorted(measured))
-    taken = {*choose_subset(classes, config.limit, seed), *added}
+    before = [name for name in classes if measured[name].content in settled.splits]
+    taken = {*choose_subset(classes, config.limit, seed, before), *added}
     surfaces = [(label, *of) for label, of in copies.items()]
     contents = [[meshes[label].content for label in surface] for surface in surfaces]
     # A surface is split as that of its files was that came first.

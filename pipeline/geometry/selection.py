@@ -1,7 +1,7 @@
 """Which objects a run takes, and which split each belongs to: by family, stratified by class."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Literal
 
 import numpy as np
@@ -14,19 +14,40 @@ Split = Literal["train", "val", "test"]
 _SPLITS = 3
 
 
-def choose_subset(classes: Mapping[str, ShapeClass], limit: int, seed: int) -> list[str]:
-    """At most `limit` names (0: all), sorted, spread as evenly over the classes as they allow.
+def choose_subset(
+    classes: Mapping[str, ShapeClass], limit: int, seed: int, taken: Collection[str] = ()
+) -> list[str]:
+    """At most `limit` names, spread as evenly over the classes as they allow.
 
     Deterministic in names, classes and seed, whatever the order of the mapping.
+
+    Parameters
+    ----------
+    classes
+        Class of each object.
+    limit
+        How many at most; 0: all.
+    seed
+        Of the draw.
+    taken
+        Names that were chosen before and stay, as far as they fit.
+
+    Returns
+    -------
+    The names, sorted.
     """
     if limit == 0 or limit >= len(classes):
         return sorted(classes)
-    queues = [names for names in _shuffled_by_class(classes, seed).values() if names]
-    chosen: list[str] = []
+    stay = {name: kind for name, kind in classes.items() if name in taken}
+    if len(stay) > limit:
+        return choose_subset(stay, limit, seed)
+    chosen, counts = list(stay), Counter(stay.values())
+    queues = _shuffled_by_class(classes, seed)
+    queues = {kind: [n for n in names if n not in stay] for kind, names in queues.items()}
     while len(chosen) < limit:
-        for names in queues:
-            if names and len(chosen) < limit:
-                chosen.append(names.pop())
+        kind = min((kind for kind in queues if queues[kind]), key=lambda kind: counts[kind])
+        chosen.append(queues[kind].pop())
+        counts[kind] += 1
     return sorted(chosen)
 
 

@@ -1,5 +1,6 @@
 """Catalogue objects ↔ softgrip.v1.CatalogueObject."""
 
+from functools import lru_cache
 from pathlib import Path
 from typing import cast, get_args
 
@@ -8,7 +9,7 @@ import numpy as np
 from pipeline.artifacts.names import file_name
 from pipeline.artifacts.reading import open_artifact
 from pipeline.artifacts.tensors import set_tensors, tensors_of, to_tensor
-from pipeline.errors import ContentError, MeshError
+from pipeline.errors import ArtifactError, ContentError, MeshError
 from pipeline.geometry.catalogue import CatalogueObject, Material
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.shape import ShapeClass
@@ -114,6 +115,26 @@ def read_objects(path: Path) -> dict[str, tuple[CatalogueObject, str]]:
             message.name: (object_of(message), message.split)
             for _, message in artifact.messages(objects_pb2.CatalogueObject)
         }
+
+
+def objects_by_key(path: Path) -> dict[str, CatalogueObject]:
+    """Key → object of an artifact; none where it is not there or cannot be read."""
+    try:
+        found = [item for item, _ in read_objects(path).values()]
+    except ArtifactError:
+        return {}  # made anew, all of it
+    return {item.key: item for item in found if item.key}
+
+
+def catalogue(path: Path) -> dict[str, tuple[CatalogueObject, str]]:
+    """What `read_objects` reads, once a process as long as the file stays."""
+    status = path.stat()
+    return _catalogue(path, status.st_ino, status.st_mtime_ns)
+
+
+@lru_cache(maxsize=1)
+def _catalogue(path: Path, inode: int, time_ns: int) -> dict[str, tuple[CatalogueObject, str]]:
+    return read_objects(path)
 
 
 def _mesh_message(mesh: Mesh) -> objects_pb2.TriangleMesh:

@@ -64,6 +64,7 @@ def scene_message(scene: ClutterScene, renderer: str) -> scenes_pb2.Scene:
     shape_class, distribution = level_of(scene.level)
     return scenes_pb2.Scene(
         key=scene.key,
+        generator=scene.generator,
         scene_id=scene.scene_id,
         level=scene.level,
         shape_class=shape_class,
@@ -125,6 +126,16 @@ def read_placed(path: Path, index: int) -> tuple[PlacedObject, ...]:
         return _placed(message)
 
 
+def numbers_by_key(path: Path) -> dict[str, int]:
+    """Key → number of each scene of an artifact; none where it is not there or cannot be read."""
+    try:
+        with open_artifact(path) as artifact:
+            scenes = [scene for _, scene in artifact.messages(scenes_pb2.Scene)]
+    except ArtifactError:
+        return {}  # made anew, all of it
+    return {scene.key: number for number, scene in enumerate(scenes) if scene.key}
+
+
 def read_placements(path: Path) -> dict[str, tuple[PlacedObject, ...]]:
     """Scene id → its objects where they lie, in the order of the scenes; no image is read."""
     with open_artifact(path) as artifact:
@@ -156,6 +167,7 @@ def _scene(artifact: Artifact, message: scenes_pb2.Scene, time_ns: int) -> Clutt
         contacts=tuple((int(a), int(b)) for a, b in contacts),
         settle_time_s=message.settle_time_s,
         key=message.key,
+        generator=message.generator,
         views=tuple(_view(artifact, viewpoint, time_ns) for viewpoint in message.viewpoints),
     )
 

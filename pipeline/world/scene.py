@@ -58,6 +58,8 @@ class ClutterScene:
         Pictures of the cameras.
     key
         Digest of what the scene rests on; empty where it is not told.
+    generator
+        Where its generator stood when its objects were drawn; empty where it is not told.
     """
 
     scene_id: str
@@ -70,3 +72,4 @@ class ClutterScene:
     settle_time_s: float
     views: tuple[CameraView, ...]
     key: str = ""
+    generator: str = ""

@@ -26,6 +26,21 @@ def test_a_subset_is_even_over_classes(
         assert count == there[kind] or count >= max(taken.values()) - 1
 
 
+@given(CLASSES, CLASSES, st.integers(1, 30), st.integers(0, 2**32))
+def test_a_subset_stays_when_others_come_or_go(
+    first: dict[str, ShapeClass], more: dict[str, ShapeClass], limit: int, seed: int
+) -> None:
+    before = choose_subset(first, limit, seed)
+    after = choose_subset(more | first, limit, seed, before)
+    assert set(before) <= set(after)
+    assert len(after) == min(limit, len(more | first))
+    assert set(after) - set(before) <= set(more)
+    rest = {name: kind for name, kind in first.items() if name != before[0]}
+    again = choose_subset(rest, limit, seed, before)
+    assert set(before) - set(again) == {before[0]}
+    assert set(choose_subset(first, 1, seed, before)) <= set(before)
+
+
 def alone(classes: dict[str, ShapeClass]) -> dict[str, str]:
     """Every object is a family of its own."""
     return {name: name for name in classes}

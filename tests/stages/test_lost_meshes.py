@@ -111,7 +111,7 @@ def test_an_object_lost_while_it_is_cut_is_as_if_it_had_never_been_there(
         settled=settled,
     )
     left_out = LeftOut()
-    plan, made = objects.finish(stage, measured, planned, Losing({lost}), left_out)
+    plan, made = objects.finish(stage, measured, planned, Losing({lost}), left_out, {})
     assert left_out.cut_short == [f"{lost}.ply"]
     assert len(made) == 5
     assert lost not in {item.name for item in made}

@@ -40,7 +40,7 @@ class Viewpoint(_message.Message):
     def __init__(self, name: _Optional[str] = ..., width_px: _Optional[int] = ..., height_px: _Optional[int] = ..., intrinsics: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., world_from_camera: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., sensor: _Optional[str] = ..., near_m: _Optional[float] = ..., far_m: _Optional[float] = ...) -> None: ...
 
 class Scene(_message.Message):
-    __slots__ = ("scene_id", "level", "shape_class", "distribution", "split", "seed", "objects", "contacts", "settle_time_s", "renderer", "viewpoints", "attempts", "key")
+    __slots__ = ("scene_id", "level", "shape_class", "distribution", "split", "seed", "objects", "contacts", "settle_time_s", "renderer", "viewpoints", "attempts", "key", "generator")
     SCENE_ID_FIELD_NUMBER: _ClassVar[int]
     LEVEL_FIELD_NUMBER: _ClassVar[int]
     SHAPE_CLASS_FIELD_NUMBER: _ClassVar[int]
@@ -54,6 +54,7 @@ class Scene(_message.Message):
     VIEWPOINTS_FIELD_NUMBER: _ClassVar[int]
     ATTEMPTS_FIELD_NUMBER: _ClassVar[int]
     KEY_FIELD_NUMBER: _ClassVar[int]
+    GENERATOR_FIELD_NUMBER: _ClassVar[int]
     scene_id: str
     level: int
     shape_class: str
@@ -67,4 +68,5 @@ class Scene(_message.Message):
     viewpoints: _containers.RepeatedCompositeFieldContainer[Viewpoint]
     attempts: int
     key: str
-    def __init__(self, scene_id: _Optional[str] = ..., level: _Optional[int] = ..., shape_class: _Optional[str] = ..., distribution: _Optional[str] = ..., split: _Optional[str] = ..., seed: _Optional[int] = ..., objects: _Optional[_Iterable[_Union[PlacedObject, _Mapping]]] = ..., contacts: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., settle_time_s: _Optional[float] = ..., renderer: _Optional[str] = ..., viewpoints: _Optional[_Iterable[_Union[Viewpoint, _Mapping]]] = ..., attempts: _Optional[int] = ..., key: _Optional[str] = ...) -> None: ...
+    generator: str
+    def __init__(self, scene_id: _Optional[str] = ..., level: _Optional[int] = ..., shape_class: _Optional[str] = ..., distribution: _Optional[str] = ..., split: _Optional[str] = ..., seed: _Optional[int] = ..., objects: _Optional[_Iterable[_Union[PlacedObject, _Mapping]]] = ..., contacts: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., settle_time_s: _Optional[float] = ..., renderer: _Optional[str] = ..., viewpoints: _Optional[_Iterable[_Union[Viewpoint, _Mapping]]] = ..., attempts: _Optional[int] = ..., key: _Optional[str] = ..., generator: _Optional[str] = ...) -> None: ...
