@@ -39,7 +39,7 @@ class Table:
     name
         Its name in SQL.
     stage
-        The stage whose artifact holds it.
+        The stage whose artifact holds it; empty: every artifact holds some of it.
     meaning
         What one row is.
     columns
@@ -65,7 +65,7 @@ POSE = (
 Q = Column("q", "f8", "label of S-1.12, in [0, 1]")
 P = Column("p", "f8", "pressure of Eq. (2), in [0, 1]")
 
-TABLES = (
+OF_STAGES = (
     Table(
         "objects",
         "objects",
@@ -224,6 +224,21 @@ TABLES = (
         ),
     ),
 )
+# Of the provenance that every artifact carries.
+INPUTS = Table(
+    "inputs",
+    "",
+    "a file that a stage read",
+    (
+        Column("stage", TEXT, "the stage"),
+        Column("input", TEXT, "the file: an artifact of the run, meshes/..., or another name"),
+        Column("sha256", TEXT, "of the file as the stage read it"),
+        Column("present_sha256", TEXT, "of the artifact that lies there now; NULL of other files"),
+        Column("schema_version", TEXT, "that the stage's artifact was written with"),
+        Column("package_version", TEXT, "of the softgrip that wrote it"),
+    ),
+)
+TABLES = (*OF_STAGES, INPUTS)
 BY_NAME = {table.name: table for table in TABLES}
 
 # Questions of a working day; the tests ask them of a small run.
@@ -292,7 +307,8 @@ def page() -> str:
         "",
     ]
     for table in TABLES:
-        told = f"A row is {table.meaning}; from stage {table.stage}."
+        source = f"stage {table.stage}" if table.stage else "the provenance of every artifact"
+        told = f"A row is {table.meaning}; from {source}."
         lines += [f"## {table.name}", "", told, ""]
         lines += ["| column | type | meaning |", "|-|-|-|"]
         lines += [f"| `{c.name}` | {c.kind} | {c.meaning} |" for c in table.columns]

@@ -20,7 +20,17 @@ from pipeline.errors import ArtifactError, MachineError
 from pipeline.execution import RunFolder, run_command
 from pipeline.housekeeping.listing import disk_use_bytes, size_in_words
 from pipeline.interchange.croissant import croissant_metadata
-from pipeline.interchange.hub import EXAMPLES, check_room, copy_files, write_examples, write_preview
+from pipeline.interchange.hub import (
+    EXAMPLES,
+    PREVIEW,
+    PREVIEW_SAMPLE_BYTES,
+    check_room,
+    copy_files,
+    not_there,
+    remove_former,
+    write_examples,
+    write_preview,
+)
 from pipeline.network.samples import SPLITS
 from pipeline.reporting.facts import read_catalogue, read_summary
 from pipeline.reporting.page import markdown_page
@@ -62,16 +72,19 @@ def publish_run(folder: RunFolder, into: Path) -> int:
     shards = listed_shards(folder.artifact("shards"))
     files = [folder.path / name for name in PUBLISHED] + shards
     pairs = [(path, into / path.relative_to(folder.path)) for path in files]
-    lacking = [source for source, target in pairs if not target.is_file()]
-    check_room(into, sum(map(disk_use_bytes, lacking)))
+    splits = [one for one in SPLITS if listed_shards(folder.artifact("shards"), [one])]
+    rows = config.dataset.preview_samples
+    lacking = not_there(pairs)
+    size = sum(disk_use_bytes(source) for source, _ in lacking)
+    check_room(into, size + len(splits) * rows * PREVIEW_SAMPLE_BYTES)
     (into / SUMS).unlink(missing_ok=True)
-    copy_files(pairs)
-    preview, counts = {}, {}
-    for split in SPLITS:
-        if listed_shards(folder.artifact("shards"), [split]):
-            preview[split] = into / "preview" / f"{split}.parquet"
-            rows = config.dataset.preview_samples
-            counts[split] = write_preview(folder.artifact("shards"), split, preview[split], rows)
+    copy_files(lacking)
+    preview = {split: into / PREVIEW / f"{split}.parquet" for split in splits}
+    remove_former(into, {target for _, target in pairs} | set(preview.values()))
+    counts = {
+        split: write_preview(folder.artifact("shards"), split, path, rows)
+        for split, path in preview.items()
+    }
     write_examples(into)
     catalogue = read_catalogue(folder.artifact("objects"))
     meshes, licence, licence_text = describe_meshes(folder, config, catalogue)

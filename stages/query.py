@@ -16,7 +16,7 @@ from pipeline.errors import ArtifactError
 from pipeline.execution.commands import run_command
 from pipeline.execution.stage import RunFolder
 from pipeline.housekeeping.pruning import in_use
-from schemas.tables import TABLES
+from schemas.tables import OF_STAGES, TABLES
 from stages.graph import RUNS_DIR
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
@@ -59,7 +59,7 @@ def query(
 
 def artifacts_of(folder: RunFolder) -> dict[str, Path]:
     """Stage → its artifact, of those that are there and hold tables."""
-    paths = {table.stage: folder.artifact(table.stage) for table in TABLES}
+    paths = {table.stage: folder.artifact(table.stage) for table in OF_STAGES}
     return {stage: path for stage, path in paths.items() if path.is_file()}
 
 
@@ -68,7 +68,7 @@ def tables_there_are(made: dict[str, Path]) -> str:
     lines = []
     for table in TABLES:
         columns = ", ".join(column.name for column in table.columns)
-        there = "" if table.stage in made else f" (not made yet: stage {table.stage})"
+        there = "" if table.stage in {"", *made} else f" (not made yet: stage {table.stage})"
         lines.append(f"{table.name}{there}: {columns}\n")
     return "".join(lines)
 

@@ -19,6 +19,7 @@ from pipeline.reporting.failures import failures_of
 from pipeline.reporting.figures import figures_of, overall_rates, proposed_tables
 from pipeline.reporting.lineage import lineage_of, lineage_svg
 from pipeline.reporting.page import html_page, markdown_page
+from pipeline.reporting.tables import table_pages
 from pipeline.reporting.words import describe_meshes, headline, mixed_parts
 from stages.graph import MADE, RUNS_DIR
 
@@ -57,7 +58,8 @@ def make_report(folder: RunFolder) -> Path:
     success = read_success(folder.artifact("evaluate")) if summaries["evaluate"] else {}
     referee = read_summary(RunFolder(folder.path / "referee").summary("referee"))
     figures = figures_of(folder, summaries, catalogue, success, referee)
-    figures[LINEAGE] = lineage_svg(lineage_of(folder, summaries, catalogue))
+    steps = lineage_of(folder, summaries, catalogue, lambda step: f"{FIGURES}/{step}.html")
+    figures[LINEAGE] = lineage_svg(steps)
     failures, pictures = (
         failures_of(folder, config, next(iter(success)), FAILURES) if success else ([], {})
     )
@@ -104,7 +106,9 @@ def make_report(folder: RunFolder) -> Path:
     )
     files = {f"{FIGURES}/{name}.svg": svg.encode() for name, svg in figures.items()}
     files |= {f"{FIGURES}/{name}": jpeg for name, jpeg in pictures.items()}
-    for path, data in files.items():
+    tables = {step.name: step.link for step in steps if step.link.startswith(FIGURES)}
+    made = {name: folder.artifact(name) for name in names if folder.artifact(name).is_file()}
+    for path, data in (files | table_pages(folder, made, tables)).items():
         publish_bytes(folder.path / path, data)
     publish_bytes(folder.path / "report.md", text.encode())
     page, linked = folder.path / "report.html", f"{FIGURES}/{LINEAGE}.svg"

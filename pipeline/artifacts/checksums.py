@@ -1,6 +1,6 @@
 """SHA256SUMS of a folder that is handed on, in the form that `sha256sum -c` reads."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from pipeline.artifacts.inspection import Finding
@@ -51,6 +51,31 @@ def read_checksums(folder: Path) -> dict[str, str]:
     return found
 
 
+def compare_digests(folder: Path, recorded: Mapping[str, str]) -> Iterator[Finding]:
+    """Compare files of a folder with their recorded digests.
+
+    Parameters
+    ----------
+    folder
+        The folder.
+    recorded
+        File below it → SHA-256 of what it held.
+
+    Yields
+    ------
+    Finding
+        One for each file, in the order given.
+    """
+    for name, digest in recorded.items():
+        path = folder / name
+        if not path.is_file():
+            yield Finding(path, "missing")
+        elif (found := file_sha256(path)) != digest:
+            yield Finding(path, f"changed: SHA-256 was {digest[:12]}, is {found[:12]}")
+        else:
+            yield Finding(path)
+
+
 def verify_folder(folder: Path) -> Iterator[Finding]:
     """Compare every file of a folder with its list of digests.
 
@@ -70,14 +95,7 @@ def verify_folder(folder: Path) -> Iterator[Finding]:
         The list is missing or damaged.
     """
     recorded = read_checksums(folder)
-    for name, digest in recorded.items():
-        path = folder / name
-        if not path.is_file():
-            yield Finding(path, "missing, though the list names it")
-        elif (found := file_sha256(path)) != digest:
-            yield Finding(path, f"changed: SHA-256 was {digest[:12]}, is {found[:12]}")
-        else:
-            yield Finding(path)
+    yield from compare_digests(folder, recorded)
     for path in sorted(folder.rglob("*")):
         name = path.relative_to(folder).as_posix()
         if path.is_file() and path.name != SUMS and name not in recorded:

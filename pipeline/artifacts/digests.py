@@ -6,6 +6,8 @@ from typing import Any
 
 from pipeline.artifacts.publishing import file_sha256, publish_bytes
 
+MEMO = "hashes.json"  # in a run's state: what all its commands remember
+
 
 def content_digests(files: dict[str, Path], memo: Path) -> dict[str, str]:
     """SHA-256 of each file; one unchanged in size, date and inode is not read again."""

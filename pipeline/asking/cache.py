@@ -17,10 +17,11 @@ from pipeline.artifacts.digests import content_digests
 from pipeline.artifacts.publishing import published
 from pipeline.asking.rows import NONE, ROWS, Part, Values, Words
 from pipeline.errors import ArtifactError
-from schemas.tables import BY_NAME, TEXT, Table
+from schemas.tables import BY_NAME, TEXT, Column, Table
 
 QUERY_CACHE = "query"  # in the run's state
-CACHE_VERSION = 1  # rises whenever rows are made in another way
+CACHE_VERSION = 2  # rises whenever rows are made in another way
+BATCH_ROWS = 1 << 16  # beside so many rows, what a batch costs by itself does not count
 DIGITS = 16  # of a digest: enough to tell the artifacts of one run apart
 
 
@@ -62,7 +63,7 @@ def arrow_table(name: str, artifact: Path, cache: Path) -> pa.Table:
 
 
 def write_rows(path: Path, table: Table, parts: Iterator[Part]) -> None:
-    """Write the rows of a table as an Arrow file, part by part.
+    """Write the rows of a table as an Arrow file, many parts at a time.
 
     Parameters
     ----------
@@ -78,76 +79,122 @@ def write_rows(path: Path, table: Table, parts: Iterator[Part]) -> None:
     ArtifactError
         A part has a column that the table lacks.
     """
-    known = {column.name: Vocabulary() for column in table.columns if column.kind == TEXT}
+    columns = {column.name: GrowingColumn(column) for column in table.columns}
     schema = arrow_schema(table)
-    # Vocabularies only grow, and what is new of them is written beside the part that needs it.
+    # Vocabularies only grow, and what is new of them is written beside the batch that needs it.
     options = pa.ipc.IpcWriteOptions(emit_dictionary_deltas=True)
     with pa.OSFile(str(path), "wb") as file, pa.ipc.new_file(file, schema, options=options) as out:
+
+        def write_waiting() -> None:
+            arrays = [column.taken() for column in columns.values()]
+            out.write_batch(pa.record_batch(arrays, schema=schema))
+
+        waiting = 0
         for part in parts:
-            if strange := set(part) - set(schema.names):
+            if strange := part.keys() - columns.keys():
                 raise ArtifactError(f"Table {table.name} has no {strange}", "Report this")
             rows = max((len(values) for values in part.values()), default=0)
-            arrays = [
-                arrow_array(part.get(field.name), rows, field.type, known.get(field.name))
-                for field in schema
-            ]
-            if rows:
-                out.write_batch(pa.record_batch(arrays, schema=schema))
+            for name, column in columns.items():
+                column.add(part.get(name), rows)
+            waiting += rows
+            if waiting >= BATCH_ROWS:
+                write_waiting()
+                waiting = 0
+        if waiting:
+            write_waiting()
 
 
-class Vocabulary:
-    """The words of one column so far, in the order they came."""
+class GrowingColumn:
+    """Values of one column that wait to be written; NaN, and a word that is not there, is NULL."""
 
-    def __init__(self) -> None:
-        self._numbers: dict[str, int] = {}
-        self._words = pa.array([], pa.string())
+    def __init__(self, column: Column) -> None:
+        self._type = arrow_type(column)
+        self._numbers: dict[str, int] | None = {} if column.kind == TEXT else None
+        self._waiting: list[np.ndarray] = []
+        self._missing: list[np.ndarray] = []
+        self._last: tuple[tuple[str, ...], np.ndarray] = ((), np.array([NONE], np.int32))
 
-    def encode(self, column: Words) -> pa.DictionaryArray:
-        """The column over all words so far and its own."""
-        numbers = [self._numbers.setdefault(word, len(self._numbers)) for word in column.names]
-        if len(self._numbers) > len(self._words):
-            self._words = pa.array(list(self._numbers), pa.string())
-        none = np.asarray(column.index) == NONE
-        index = np.array([*numbers, 0], dtype=np.int32)[np.asarray(column.index, dtype=np.int64)]
-        return pa.DictionaryArray.from_arrays(pa.array(index, mask=none), self._words)
+    def add(self, values: Values | None, rows: int) -> None:
+        """Let the values of a part wait; None where the file does not tell them.
+
+        Parameters
+        ----------
+        values
+            The values.
+        rows
+            How many there are.
+        """
+        if self._numbers is not None:
+            kept = self._numbers_of(values) if isinstance(values, Words) else np.full(rows, NONE)
+        elif values is None or isinstance(values, Words):
+            kept = np.zeros(rows, self._type.to_pandas_dtype())
+        else:
+            kept = np.asarray(values, self._type.to_pandas_dtype())
+        self._waiting.append(kept)
+        self._missing.append(np.full(rows, values is None or isinstance(values, Words)))
+
+    def taken(self) -> pa.Array:
+        """What waits, as one array; nothing waits any longer."""
+        values, missing = np.concatenate(self._waiting), np.concatenate(self._missing)
+        self._waiting, self._missing = [], []
+        if self._numbers is not None:
+            numbers = plain_array(values, values == NONE, pa.int32())
+            return pa.DictionaryArray.from_arrays(numbers, string_array(list(self._numbers)))
+        if pa.types.is_floating(self._type):
+            missing |= np.isnan(values)
+        return plain_array(values, missing, self._type)
+
+    def _numbers_of(self, column: Words) -> np.ndarray:
+        """The column's words by their numbers, in the order in which words came."""
+        assert self._numbers is not None
+        names, numbers = self._last
+        if names != column.names:
+            known = self._numbers
+            found = [known.setdefault(word, len(known)) for word in column.names]
+            numbers = np.array([*found, NONE], dtype=np.int32)  # NONE as an index is the last
+            self._last = (column.names, numbers)
+        of_rows: np.ndarray = numbers[column.index]
+        return of_rows
+
+
+def arrow_type(column: Column) -> pa.DataType:
+    """The Arrow type of a column."""
+    if column.kind == TEXT:
+        return pa.dictionary(pa.int32(), pa.string())
+    return pa.from_numpy_dtype(column.kind)
 
 
 def arrow_schema(table: Table) -> pa.Schema:
     """The Arrow types of a table's columns."""
-    text = pa.dictionary(pa.int32(), pa.string())
-    return pa.schema(
-        [
-            (column.name, text if column.kind == TEXT else pa.from_numpy_dtype(column.kind))
-            for column in table.columns
-        ]
-    )
+    return pa.schema([(column.name, arrow_type(column)) for column in table.columns])
 
 
-def arrow_array(
-    values: Values | None, rows: int, kind: pa.DataType, vocabulary: Vocabulary | None
-) -> pa.Array:
-    """One column of a part; NaN, and a word that is not there, is NULL.
+# Arrays are made of buffers: pyarrow.array would load pandas, half a second of a short stage.
+def plain_array(values: np.ndarray, missing: np.ndarray, kind: pa.DataType) -> pa.Array:
+    """Numbers as an Arrow array.
 
     Parameters
     ----------
     values
-        Its values; None where the file does not tell.
-    rows
-        How many there are.
+        Of any number type, shape (n,).
+    missing
+        Which of them are NULL, shape (n,).
     kind
-        The column's type.
-    vocabulary
-        Of a column of words.
+        The array's type.
 
     Returns
     -------
-    The column.
+    The array.
     """
-    if vocabulary is not None:
-        if not isinstance(values, Words):
-            values = Words((), np.full(rows, NONE))
-        return vocabulary.encode(values)
-    if values is None or isinstance(values, Words):
-        return pa.nulls(rows, kind)
-    array = np.asarray(values, dtype=kind.to_pandas_dtype())
-    return pa.array(array, kind, from_pandas=True)
+    stored = np.ascontiguousarray(values, dtype=kind.to_pandas_dtype())
+    there = np.packbits(~missing, bitorder="little") if missing.any() else None
+    validity = None if there is None else pa.py_buffer(there)
+    return pa.Array.from_buffers(kind, len(stored), [validity, pa.py_buffer(stored)])
+
+
+def string_array(words: list[str]) -> pa.Array:
+    """Words as an Arrow array."""
+    encoded = [word.encode() for word in words]
+    ends = np.cumsum([0, *map(len, encoded)], dtype=np.int32)
+    buffers = [None, pa.py_buffer(ends), pa.py_buffer(b"".join(encoded))]
+    return pa.Array.from_buffers(pa.string(), len(words), buffers)

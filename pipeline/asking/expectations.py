@@ -1,7 +1,6 @@
 """What is expected of a run's artifacts, and what is found of it."""
 
 import math
-import time
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -11,8 +10,8 @@ from typing import Any
 
 from pydantic import TypeAdapter, ValidationError
 
-from pipeline.asking.query import ask
-from pipeline.config.expectations import Expectation
+from pipeline.asking.query import OpenTables, open_tables
+from pipeline.config.expectations import EVERY, Expectation
 from pipeline.errors import ConfigError, SoftgripError
 
 DECLARED = Path(__file__).resolve().parents[2] / "schemas" / "expectations.toml"
@@ -93,14 +92,15 @@ def check_expectations(
     -------
     One finding for each expectation of that stage.
     """
-    expected = [one for one in (*declared_expectations(), *own) if one.stage == stage]
-    return [check(one, artifacts, cache_folder) for one in expected]
+    expected = [one for one in (*declared_expectations(), *own) if one.stage in {stage, EVERY}]
+    with open_tables(artifacts, cache_folder, stage) as tables:
+        return [check(one, tables) for one in expected]
 
 
-def check(expected: Expectation, artifacts: Mapping[str, Path], cache_folder: Path) -> Found:
+def check(expected: Expectation, tables: OpenTables) -> Found:
     """Ask one number and hold it against its bounds; what cannot be asked does not hold."""
     try:
-        answer = ask(expected.sql, artifacts, cache_folder)
+        answer = tables.ask(expected.sql)
     except SoftgripError as error:
         return Found(expected, None, f"cannot be asked: {error.what}")
     if answer.num_rows != 1 or answer.num_columns != 1:
@@ -119,15 +119,6 @@ def outside(value: float, expected: Expectation) -> str:
     if expected.at_most is not None and value > expected.at_most:
         return f"is {value:g}, must be at most {expected.at_most:g}"
     return ""
-
-
-def timed_check(
-    stage: str, own: Sequence[Expectation], artifacts: Mapping[str, Path], cache_folder: Path
-) -> tuple[list[Found], float]:
-    """`check_expectations`, and the wall time that it took [s]."""
-    started = time.perf_counter()
-    found = check_expectations(stage, own, artifacts, cache_folder)
-    return found, time.perf_counter() - started
 
 
 def as_markdown(found: Sequence[Found]) -> str:

@@ -2,13 +2,15 @@
 
 import difflib
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 import duckdb
 import pyarrow as pa
 
 from pipeline.asking.cache import arrow_table
+from pipeline.asking.origins import inputs_table
 from pipeline.errors import QueryError
 from schemas.tables import BY_NAME, TABLES
 
@@ -34,22 +36,69 @@ def ask(sql: str, artifacts: Mapping[str, Path], cache: Path) -> pa.Table:
     QueryError
         DuckDB cannot answer it, or it asks for a table whose stage is not made.
     """
+    with open_tables(artifacts, cache) as tables:
+        return tables.ask(sql)
+
+
+class OpenTables:
+    """The tables of a run, of which those that a question names are opened, once."""
+
+    def __init__(
+        self, connection: duckdb.DuckDBPyConnection, artifacts: Mapping[str, Path], cache: Path
+    ) -> None:
+        self._connection = connection
+        self._artifacts = artifacts
+        self._cache = cache
+        self._opened: set[str] = set()
+
+    def ask(self, sql: str) -> pa.Table:
+        """Answer a question; as `ask`."""
+        for name in mentioned(sql):
+            stage = BY_NAME[name].stage
+            if name in self._opened or (stage and stage not in self._artifacts):
+                continue
+            if stage:
+                rows = arrow_table(name, self._artifacts[stage], self._cache)
+            else:
+                rows = inputs_table(self._artifacts, self._cache)
+            self._connection.register(name, rows)
+            self._opened.add(name)
+        try:
+            relation = self._connection.sql(sql)
+            if relation is None:
+                raise QueryError("The last statement answers nothing", "End with a SELECT")
+            return relation.to_arrow_table()
+        except duckdb.Error as error:
+            raise QueryError(str(error), remedy_of(sql, str(error), self._artifacts)) from error
+
+
+@contextmanager
+def open_tables(
+    artifacts: Mapping[str, Path], cache: Path, stage: str = ""
+) -> Iterator[OpenTables]:
+    """The tables of a run for several questions.
+
+    Parameters
+    ----------
+    artifacts
+        Stage → its artifact, of the stages that are made.
+    cache
+        Folder of the tables' Arrow files.
+    stage
+        What ``getvariable('stage')`` is in a question: the stage that has ended, if one has.
+
+    Yields
+    ------
+    OpenTables
+        What answers them.
+    """
     with duckdb.connect() as connection:
         # A name in SQL is a table or a file, never a variable of this program.
         connection.execute("SET python_enable_replacements = false")
         # The order in which several threads add up shows in the last digits of a mean.
         connection.execute("SET threads = 1")
-        for name in mentioned(sql):
-            stage = BY_NAME[name].stage
-            if stage in artifacts:
-                connection.register(name, arrow_table(name, artifacts[stage], cache))
-        try:
-            relation = connection.sql(sql)
-            if relation is None:
-                raise QueryError("The last statement answers nothing", "End with a SELECT")
-            return relation.to_arrow_table()
-        except duckdb.Error as error:
-            raise QueryError(str(error), remedy_of(sql, str(error), artifacts)) from error
+        connection.execute("SET VARIABLE stage = $stage", {"stage": stage})
+        yield OpenTables(connection, artifacts, cache)
 
 
 def mentioned(sql: str) -> list[str]:
@@ -75,7 +124,7 @@ def remedy_of(sql: str, reason: str, artifacts: Mapping[str, Path]) -> str:
     A sentence.
     """
     asked = mentioned(sql)
-    missing = [name for name in asked if BY_NAME[name].stage not in artifacts]
+    missing = [name for name in asked if BY_NAME[name].stage not in {"", *artifacts}]
     if missing:
         stages = dict.fromkeys(BY_NAME[name].stage for name in missing)
         return f"Make them first, or leave out {', '.join(missing)}: {', '.join(stages)} not made"

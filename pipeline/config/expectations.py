@@ -6,7 +6,8 @@ from pydantic import Field, model_validator
 
 from pipeline.config.section import Section
 
-StageName = Literal["objects", "scenes", "grasps", "shards", "train", "evaluate"]
+EVERY = "every"  # as a stage
+StageName = Literal["every", "objects", "scenes", "grasps", "shards", "train", "evaluate"]
 Severity = Literal["error", "warning"]
 
 
@@ -14,7 +15,7 @@ class Expectation(Section):
     """One number, asked in SQL, that must lie within bounds."""
 
     name: str = Field(min_length=1, description="what must hold, in words")
-    stage: StageName = Field(description="at whose end it is checked")
+    stage: StageName = Field(description="at whose end it is checked; every: at the end of each")
     sql: str = Field(min_length=1, description="a question whose answer is one number")
     at_least: float | None = Field(None, description="least value that is well; none: no bound")
     at_most: float | None = Field(None, description="greatest value that is well; none: no bound")

@@ -18,6 +18,7 @@ DRAWING = ("pipeline.recording",)  # what only draws: no result may be from it
 RUNNING = (
     "pipeline.artifacts.digests",
     "pipeline.asking",
+    "pipeline.config.expectations",
     "pipeline.execution.code",
     "pipeline.execution.commands",
     "pipeline.execution.freshness",

@@ -17,6 +17,7 @@ from filelock import FileLock, Timeout
 from loguru import logger
 
 from pipeline.artifacts import open_artifact, publish_bytes, read_provenance
+from pipeline.artifacts.digests import MEMO
 from pipeline.artifacts.publishing import CANNOT_WRITE, remove_abandoned_scratch, write_error
 from pipeline.errors import SoftgripError
 from pipeline.execution.commands import EXIT_FAILURE, log_to
@@ -24,7 +25,6 @@ from pipeline.execution.executors import Executor
 from pipeline.execution.sealing import refuse_sealed
 from pipeline.execution.stage import RunFolder, Stage, StageContext
 from pipeline.execution.staleness import (
-    MEMO,
     InputsOf,
     artifact_is_fresh,
     drawing_note_path,
@@ -122,7 +122,9 @@ def run_stage(
         return
     logger.info("{}: started ({} workers)", name, context.workers)
     figures = build(context)
+    checking = time.perf_counter()
     context, found = checked(context)
+    checked_s = time.perf_counter() - checking
     if draw is not None:
         draw_recording(context, draw, figures)
     wall_s, spent_s = time.perf_counter() - started, processor_time_s() - spent_s
@@ -133,6 +135,7 @@ def run_stage(
         "recording_share": round(context.drawing.seconds / max(spent_s, CLOCK_TICK_S), 4),
         **_recording_size(context),
         "expectations": found,
+        "expectations_s": round(checked_s, 3),
         **figures,
     }
     _publish_summary(context, record)
@@ -152,9 +155,9 @@ def checked(context: StageContext) -> tuple[StageContext, list[dict[str, Any]]]:
     # DuckDB is loaded where a stage has ended, not wherever a key is computed.
     from pipeline.asking.cache import QUERY_CACHE
     from pipeline.asking.expectations import as_markdown, check_expectations
-    from schemas.tables import TABLES
+    from schemas.tables import OF_STAGES
 
-    stages = sorted({table.stage for table in TABLES})
+    stages = sorted({table.stage for table in OF_STAGES})
     made = {name: context.folder.artifact(name) for name in stages}
     found = check_expectations(
         context.name,

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.artifacts import package_version, publish_bytes
+from pipeline.artifacts.checksums import compare_digests
 from pipeline.artifacts.publishing import file_sha256
 from pipeline.errors import ArtifactError
 from pipeline.execution.stage import RunFolder
@@ -124,14 +125,9 @@ def broken_files(folder: RunFolder) -> list[str]:
     ArtifactError
         The seal is missing or damaged.
     """
-    found = []
-    for name, digest in sorted(read_seal(folder).files.items()):
-        path = folder.path / name
-        if not path.is_file():
-            found.append(f"{path} is missing")
-        elif file_sha256(path) != digest:
-            found.append(f"{path} changed since the run was sealed")
-    return found
+    recorded = dict(sorted(read_seal(folder).files.items()))
+    findings = compare_digests(folder.path, recorded)
+    return [f"{found.path}: {found.problem}" for found in findings if found.problem]
 
 
 def unseal(folder: RunFolder) -> None:

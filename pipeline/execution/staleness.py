@@ -6,6 +6,7 @@ from pathlib import Path
 from loguru import logger
 
 from pipeline.artifacts import open_artifact, read_provenance
+from pipeline.artifacts.digests import MEMO
 from pipeline.config import load_run_config
 from pipeline.errors import ArtifactError, ConfigError
 from pipeline.execution.code import DRAWING, RUNNING
@@ -16,7 +17,6 @@ from schemas.softgrip.v1.grasps_pb2 import ShardIndex
 
 InputsOf = Callable[[Stage, RunFolder, Path | None], dict[str, Path]]
 
-MEMO = "hashes.json"
 RENDERER_MEMO = "renderer.json"
 RECORDING_ALONE = "recording alone"
 

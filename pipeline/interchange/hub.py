@@ -1,12 +1,12 @@
 """A folder that a dataset hub or an archive takes as it is: files, preview, loading examples."""
 
 import shutil
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from pipeline.artifacts.publishing import publish_bytes, published
+from pipeline.artifacts.publishing import file_sha256, publish_bytes, published
 from pipeline.artifacts.sharding import listed_shards
 from pipeline.errors import ArtifactError, MachineError
 from pipeline.interchange.parquet_shards import write_parquet
@@ -16,6 +16,7 @@ from pipeline.spread import choose_evenly
 
 PREVIEW = "preview"
 SHARDS = "shards"
+PREVIEW_SAMPLE_BYTES = 24 * 24 * (3 * 4 + 1)  # at most: a cloud of float32, and its mask
 
 PYTORCH = '''\
 """Samples of a split as PyTorch tensors, by softgrip: pip install softgrip"""
@@ -70,12 +71,30 @@ def check_room(place: Path, needed_bytes: int) -> None:
         )
 
 
+def not_there(files: Sequence[tuple[Path, Path]]) -> list[tuple[Path, Path]]:
+    """Those of (from, to) whose target is missing or holds something else."""
+    return [(source, target) for source, target in files if not _same_content(source, target)]
+
+
+def _same_content(source: Path, target: Path) -> bool:
+    if not target.is_file() or target.stat().st_size != source.stat().st_size:
+        return False
+    return file_sha256(target) == file_sha256(source)
+
+
 def copy_files(files: Sequence[tuple[Path, Path]]) -> None:
-    """Copy (from, to); each appears whole or not at all, and one that is there stays."""
+    """Copy (from, to); each appears whole or not at all."""
     for source, target in files:
-        if not target.is_file() or target.stat().st_size != source.stat().st_size:
-            with published(target) as scratch:
-                shutil.copyfile(source, scratch)
+        with published(target) as scratch:
+            shutil.copyfile(source, scratch)
+
+
+def remove_former(folder: Path, kept: Collection[Path]) -> None:
+    """Remove shards and previews that were published before and are no longer of the run."""
+    for place, ending in ((SHARDS, "*.mcap"), (PREVIEW, "*.parquet")):
+        for path in sorted((folder / place).rglob(ending)):
+            if path not in kept:
+                path.unlink()
 
 
 def write_preview(index: Path, split: str, path: Path, rows: int) -> int:

@@ -1,10 +1,10 @@
 """Lineage as a picture: mesh → object → scene → grasp → sample → network → attempt.
 
-Each box has its count and its size on disk, and leads to its recording, or to the table of what
-was refused. The picture is SVG with links, which a page shows inside itself.
+Each box has its count and its size on disk, and leads to its recording, or to a table where no
+recording shows it. The picture is SVG with links, which a page shows inside itself.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from html import escape
 from typing import Any
@@ -13,6 +13,7 @@ from pipeline.execution import RunFolder
 from pipeline.geometry.catalogue import EMBEDDED
 from pipeline.housekeeping.listing import disk_use_bytes, size_in_words
 from pipeline.reporting.facts import CatalogueFacts
+from pipeline.reporting.tables import SOURCES
 
 # Of a box and the arrow behind it, in pixels of a page 54 rem wide.
 BOX_WIDTH, BOX_HEIGHT, ARROW = 104, 62, 18
@@ -42,7 +43,7 @@ class Step:
     size_bytes
         On disk [bytes].
     link
-        File of the run that shows it; empty where there is none.
+        File of the run that shows it: its recording, else its table.
     """
 
     name: str
@@ -52,7 +53,10 @@ class Step:
 
 
 def lineage_of(
-    folder: RunFolder, summaries: dict[str, dict[str, Any] | None], catalogue: CatalogueFacts
+    folder: RunFolder,
+    summaries: dict[str, dict[str, Any] | None],
+    catalogue: CatalogueFacts,
+    table: Callable[[str], str],
 ) -> list[Step]:
     """The steps of a run as far as it was made.
 
@@ -64,6 +68,8 @@ def lineage_of(
         Stage → headline figures; None where it was not made.
     catalogue
         The objects and what was refused.
+    table
+        Name of a step → path of its table, for a step without a recording.
 
     Returns
     -------
@@ -71,13 +77,16 @@ def lineage_of(
     """
     files = {item.name if item.source == EMBEDDED else item.source for item in catalogue.objects}
     found = len(files | {name for name, _ in catalogue.refused})
-    steps = [Step("sources", str(found), 0, "")]
+    meshes = folder.noted_mesh_dir
+    there = [meshes / name for name in files if (meshes / name).is_file()] if meshes else []
+    size = sum(path.stat().st_size for path in there)
+    steps = [Step(SOURCES, str(found), size, table(SOURCES))]
     for stage, name in NAMES.items():
         if (summary := summaries.get(stage)) is None:
             continue
         size = disk_use_bytes(folder.artifact(stage)) + disk_use_bytes(folder.shards(stage))
         recording = folder.recording(stage)
-        link = recording.name if recording.is_file() else ""
+        link = recording.name if recording.is_file() else table(name)
         steps.append(Step(name, counted(stage, summary), size, link))
     return steps
 

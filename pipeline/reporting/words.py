@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from pipeline.artifacts import Provenance
-from pipeline.artifacts.digests import content_digests
+from pipeline.artifacts.digests import MEMO, content_digests
 from pipeline.config import RunConfig
 from pipeline.execution import RunFolder
 from pipeline.reporting.facts import CatalogueFacts, licence_of_folder
@@ -32,7 +32,7 @@ def mixed_parts(
 ) -> list[str]:
     """Name the parts that were made from another version of an artifact than the present one."""
     there = {path.name: path for path in map(folder.artifact, stages) if path.is_file()}
-    now = content_digests(there, folder.state("hashes.json"))
+    now = content_digests(there, folder.state(MEMO))
     return [
         f"{origin.stage} was made from another {used.path}"
         for origin in provenance

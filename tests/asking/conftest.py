@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from schemas.tables import TABLES
+from schemas.tables import OF_STAGES
 from tests.artifacts.conftest import provenance
 
 __all__ = ["provenance"]
@@ -15,7 +15,7 @@ RUN = Path(__file__).parents[1] / "artifacts" / "released" / "v1-0.1.0"
 @pytest.fixture
 def made() -> dict[str, Path]:
     """Stage → artifact of a run of softgrip 0.1.0."""
-    return {table.stage: RUN / f"{table.stage}.mcap" for table in TABLES}
+    return {table.stage: RUN / f"{table.stage}.mcap" for table in OF_STAGES}
 
 
 @pytest.fixture(scope="session")

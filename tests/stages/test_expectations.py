@@ -6,11 +6,13 @@ import pytest
 from pydantic import ValidationError
 
 from pipeline.asking.expectations import (
+    Found,
     as_markdown,
     check,
     check_expectations,
     declared_expectations,
 )
+from pipeline.asking.query import open_tables
 from pipeline.config import load_run_config
 from pipeline.config.expectations import Expectation
 from pipeline.config.written import as_toml
@@ -22,6 +24,11 @@ from stages.graph import STAGES
 def expecting(sql: str, **bounds: float | str) -> Expectation:
     entry = {"name": "n", "stage": "objects", "sql": sql, "reason": "r", **bounds}
     return Expectation.model_validate(entry)
+
+
+def checked(expected: Expectation, made: dict[str, Path], cache: Path) -> Found:
+    with open_tables(made, cache, "scenes") as tables:
+        return check(expected, tables)
 
 
 @pytest.fixture(scope="module")
@@ -55,14 +62,14 @@ def test_a_small_run_keeps_every_declared_expectation(
 def test_a_number_is_held_against_its_bounds(
     sql: str, bounds: dict[str, float], problem: str, made: dict[str, Path], tmp_path: Path
 ) -> None:
-    found = check(expecting(sql, **bounds), made, tmp_path)
+    found = checked(expecting(sql, **bounds), made, tmp_path)
     assert found.problem.startswith(problem)
     assert bool(found.problem) == bool(problem)
 
 
 def test_a_warning_is_no_error(made: dict[str, Path], tmp_path: Path) -> None:
     warning = expecting("SELECT 3", at_most=2, severity="warning")
-    found = check(warning, made, tmp_path)
+    found = checked(warning, made, tmp_path)
     assert found.problem
     assert not found.is_error
     assert "**warning**: is 3" in as_markdown([found])
@@ -104,6 +111,19 @@ BROKEN = {
     ),
     "q and p lie in [0, 1]": ("grasps", "SELECT * REPLACE (q - 2 AS q) FROM grasps"),
     "no sample was lost or made up": ("samples", "SELECT * FROM samples LIMIT 7"),
+    "provenance is whole": (
+        "inputs",
+        "SELECT * REPLACE ('another' AS present_sha256) FROM inputs",
+    ),
+    "poses and wrenches of grasps are numbers": (
+        "grasps",
+        "SELECT * REPLACE ('nan'::DOUBLE AS tau_z) FROM grasps",
+    ),
+    "every scene has grasps": ("scenes", "SELECT * REPLACE ('lost' AS scene) FROM scenes"),
+    "scenes hold as many objects as they count": (
+        "scenes",
+        "SELECT * REPLACE (objects + 1 AS objects) FROM scenes",
+    ),
     "errors are numbers": ("epochs", "SELECT * REPLACE ('nan'::DOUBLE AS val_mae) FROM epochs"),
 }
 
@@ -112,8 +132,8 @@ BROKEN = {
 def test_what_is_broken_is_found(name: str, made: dict[str, Path], tmp_path: Path) -> None:
     (expected,) = (one for one in declared_expectations() if one.name == name)
     table, broken = BROKEN[name]
-    assert not check(expected, made, tmp_path).problem
+    assert not checked(expected, made, tmp_path).problem
     sql = expected.sql.replace(f"FROM {table}", f"FROM ({broken}) AS {table}")
     assert sql != expected.sql
     worse = expected.model_copy(update={"sql": sql})
-    assert check(worse, made, tmp_path).is_error
+    assert checked(worse, made, tmp_path).is_error

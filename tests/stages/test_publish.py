@@ -3,6 +3,7 @@
 import json
 import runpy
 import shutil
+import socket
 import subprocess
 from pathlib import Path
 
@@ -18,6 +19,17 @@ from pipeline.execution import RunFolder
 from pipeline.interchange.hub import check_room
 from pipeline.messages.samples import read_split
 from stages.publish import publish, publish_run
+
+
+@pytest.fixture(autouse=True)
+def no_network(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever connects to another machine fails."""
+
+    def refuse(*_: object) -> None:
+        raise OSError("there is no network here")
+
+    monkeypatch.setattr(socket, "getaddrinfo", refuse)
+    monkeypatch.setattr(socket.socket, "connect", refuse)
 
 
 @pytest.fixture(scope="module")
@@ -126,6 +138,18 @@ def test_a_disk_too_small_is_told_before_anything_is_written(
     with pytest.raises(MachineError, match="MB free, and publishing takes"):
         publish_run(run, tmp_path / "new")
     assert not (tmp_path / "new").exists()
+
+
+def test_a_run_made_anew_replaces_what_was_published(run: RunFolder, own: Path) -> None:
+    with (own / "objects.mcap").open("r+b") as file:  # of the same size, and another content
+        file.seek(100)
+        file.write(b"\0\0\0\0")
+    former = own / "shards" / "train" / "00007-of-00008.mcap"
+    former.write_bytes(b"of another making")
+    publish_run(run, own)
+    assert (own / "objects.mcap").read_bytes() == run.artifact("objects").read_bytes()
+    assert not former.exists()
+    assert not [found for found in verify_folder(own) if found.problem]
 
 
 def test_enough_room_is_no_error(tmp_path: Path) -> None:

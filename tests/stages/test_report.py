@@ -17,6 +17,7 @@ from pipeline.config.agreement import AgreementConfig
 from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder
 from pipeline.referee import agreement
+from pipeline.reporting.facts import read_catalogue
 from schemas.softgrip.v1.grasps_pb2 import ShardIndex
 from stages.graph import STAGES
 from stages.report import make_report
@@ -55,12 +56,27 @@ def page_of(folder: RunFolder) -> Page:
     return Page((folder.path / "report.html").read_text())
 
 
-def test_the_lineage_leads_to_every_recording(copied: RunFolder) -> None:
+def test_the_lineage_leads_to_every_recording_or_table(copied: RunFolder) -> None:
     links = page_of(copied).links
-    assert links == [f"{stage}.rrd" for stage in STAGES]
+    assert links == ["report/sources.html", *(f"{stage}.rrd" for stage in STAGES)]
     assert all((copied.path / link).is_file() for link in links)
     _, _, words = page_of(copied).words.partition("Lineage")  # the headline counts objects too
     assert words.index("sources") < words.index("objects") < words.index("attempts")
+
+
+def test_a_step_without_a_recording_leads_to_its_table(copied: RunFolder, tmp_path: Path) -> None:
+    recording = copied.recording("grasps")
+    shutil.move(recording, tmp_path / "kept")
+    make_report(copied)
+    links = page_of(copied).links
+    assert links[3] == "report/grasps.html"
+    told = (copied.path / links[3]).read_text()
+    assert "240 rows" in told
+    assert told.count("<tr>") == 241
+    sources = (copied.path / links[0]).read_text()
+    assert all(one.name in sources for one in read_catalogue(copied.artifact("objects")).objects)
+    shutil.move(tmp_path / "kept", recording)
+    make_report(copied)
 
 
 def test_the_page_needs_no_other_file(copied: RunFolder) -> None:

@@ -89,7 +89,7 @@ def test_a_sealed_run_that_changed_is_found_out(
     folder.summary("train").write_text("{}")
     with pytest.raises(typer.Exit):
         runs.check("tiny")
-    assert "train.summary.json changed since the run was sealed" in capsys.readouterr().out
+    assert "train.summary.json: changed: SHA-256 was" in capsys.readouterr().out
 
 
 def test_pruning_shows_first_and_frees_on_demand(
