@@ -7,6 +7,7 @@ torques about x, y (the wrench of pipeline/gripper/wrench has four rows).
 
 from collections import Counter
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -23,21 +24,39 @@ from pipeline.execution import (
     run_in_order,
     stage_command,
 )
-from pipeline.execution.items import GRASP_COUNTS, item_key, items_basis
+from pipeline.execution.items import grasps_basis, item_key
 from pipeline.labelling.balancing import quality_histogram
-from pipeline.labelling.grasps import LabelledGrasps
 from pipeline.labelling.scene import label_scene, noise_draws, scene_surfaces
-from pipeline.labelling.shown_pads import SHOWN_SCENES, ShownPads, drape_again
-from pipeline.messages.grasps import PADS_TOPIC, pads_message, read_grasps, write_grasps
+from pipeline.labelling.shown_pads import SHOWN_SCENES, drape_some_again
+from pipeline.messages.grasps import (
+    PADS_TOPIC,
+    GraspMessage,
+    grasp_messages,
+    grasps_of,
+    pads_message,
+    portions_by_key,
+    read_grasps,
+    read_portion,
+    write_messages,
+)
 from pipeline.messages.objects import catalogue
-from pipeline.messages.scenes import read_scene, scene_count
+from pipeline.messages.scenes import read_keys, read_scene
 from pipeline.recording.grasps import draw_grasps
 from pipeline.spread import choose_evenly
 from pipeline.stopwatch import Stopwatch
 from pipeline.world.raycasting import RayScene
+from pipeline.world.scene import ClutterScene
 from stages.graph import GRASPS, inputs_of
 
-GRASPS_OF = ("seed", "gripper", "sensing", "grasps")  # what the grasps of every scene rest on
+
+@dataclass(frozen=True)
+class Portion:
+    """Grasps of one scene that are drawn and balanced by themselves."""
+
+    number: int
+    grasps: int
+    key: str
+    former: Path | None  # the shard that held it before
 
 
 @dataclass(frozen=True)
@@ -45,14 +64,13 @@ class ShardJob:
     """One work item: the grasps of one scene."""
 
     scene_index: int
-    grasps: int
+    portions: tuple[Portion, ...]
     pads: int  # of its grasps, shown in the recording
     shard: Path
     objects: Path
     scenes: Path
     config: RunConfig
     provenance: Provenance
-    basis: str
 
 
 @dataclass(frozen=True)
@@ -64,30 +82,34 @@ class ShardResult:
     quality: Float[np.ndarray, " n"]
     object_names: tuple[str, ...]
     status: dict[str, int]
+    taken_over: int = 0  # portions
     recording_s: float = 0.0  # processor time of draping the pads that are shown
 
 
 def build(stage: StageContext) -> Summary:
     """Synthesize labelled grasps on every scene, one shard a scene."""
-    scenes = stage.upstream("scenes")
-    count = scene_count(scenes)
-    share, more = divmod(stage.config.grasps.count, count)
+    scenes, config, former = stage.upstream("scenes"), stage.config, portions_by_key(stage.shards)
+    keys = read_keys(scenes)
+    count = len(keys)
     recorded = choose_evenly(count, SHOWN_SCENES)
-    basis = items_basis(stage.key, stage.config, GRASPS_OF, GRASP_COUNTS)
-    pads = max(1, stage.config.recording.grasps // len(recorded))
+    basis = grasps_basis(stage.key, config)
+    pads = max(1, config.recording.grasps // len(recorded))
     jobs = [
         ShardJob(
             scene_index=index,
-            grasps=share + (index < more),
+            portions=tuple(
+                Portion(number, grasps, key, former.get(key))
+                for number, grasps in enumerate(portions)
+                for key in [item_key(basis, scene=keys[index], grasps=grasps, portion=number)]
+            ),
             pads=pads if index in recorded else 0,
             shard=shard_path(stage.shards, index, count),
             objects=stage.upstream("objects"),
             scenes=scenes,
-            config=stage.config,
+            config=config,
             provenance=stage.provenance(),
-            basis=basis,
         )
-        for index in range(count)
+        for index, portions in enumerate(config.grasps.of_scenes(count))
     ]
     done = run_in_order(synthesize_shard, jobs, stage.workers, stage.executor)
     results = list(progress(done, count, "grasps", "scene"))
@@ -95,37 +117,55 @@ def build(stage: StageContext) -> Summary:
     stage.drawing.seconds += sum(result.recording_s for result in results)
     entries = [shard_entry(r.shard, stage.output.parent, len(r.quality), r.split) for r in results]
     write_index(stage.output, stage.provenance(), entries, quality_histogram(quality))
-    return summary(results, quality, stage.config)
+    taken_over = sum(result.taken_over for result in results)
+    made = sum(len(job.portions) for job in jobs) - taken_over
+    return summary(results, quality, config) | {"taken_over": taken_over, "made": made}
 
 
 def synthesize_shard(job: ShardJob) -> ShardResult:
     """Make, or keep, the shard of one scene."""
-    draping = Stopwatch()
-    if not is_current(job.shard, job.provenance.key):
-        scene = read_scene(job.scenes, job.scene_index)
-        meshes = {name: item.mesh for name, (item, _) in catalogue(job.objects).items()}
-        rng = generator(job.config.seed, "grasps", scene.scene_id)
-        surfaces = scene_surfaces(scene, meshes, job.config.scenes.table_side_m)
-        batches = label_scene(scene, surfaces, job.config, job.grasps, rng)
-        size, rounded = job.config.grasps.samples_per_message, job.config.sensing.rounded
-        key = item_key(job.basis, scene=scene.key, grasps=job.grasps)
-        with ArtifactWriter(job.shard, job.provenance) as artifact:
-            written = write_grasps(artifact, batches, size, rounded, key)
-            if job.pads:
-                with draping.running():
-                    labelled = [grasps for _, grasps in batches]
-                    pads = draped_pads(labelled, surfaces, job.pads, job.config)
-                    artifact.write(PADS_TOPIC, pads_message(pads), log_time_ns=written)
-    return replace(examined(job.shard), recording_s=draping.seconds)
+    if is_current(job.shard, job.provenance.key):
+        return examined(job.shard)
+    draping, world = Stopwatch(), LabelledWorld(job)
+    former = {p: read_portion(p.former, p.key) for p in job.portions if p.former}
+    portions = [former.get(portion) or world.labelled(portion) for portion in job.portions]
+    messages = [message for portion in portions for message in portion]
+    with ArtifactWriter(job.shard, job.provenance) as artifact:
+        written = write_messages(artifact, messages)
+        if job.pads:
+            with draping.running():
+                labelled = [grasps_of(rows)[1] for rows, _ in messages]
+                pads = drape_some_again(labelled, job.pads, world.surfaces, job.config)
+                artifact.write(PADS_TOPIC, pads_message(pads), log_time_ns=written)
+    found = examined(job.shard)
+    taken_over = sum(map(bool, former.values()))
+    return replace(found, taken_over=taken_over, recording_s=draping.seconds)
 
 
-def draped_pads(
-    grasps: list[LabelledGrasps], surfaces: RayScene, pads: int, config: RunConfig
-) -> ShownPads:
-    """Pads of some of a scene's grasps, from its worst label to its best, draped again."""
-    quality = np.concatenate([batch.quality for batch in grasps])
-    chosen = np.argsort(quality, kind="stable")[choose_evenly(len(quality), pads)]
-    return drape_again(grasps, chosen, surfaces, config)
+@dataclass(frozen=True)
+class LabelledWorld:
+    """The scene of a shard, read when grasps are made on it and not before."""
+
+    job: ShardJob
+
+    @cached_property
+    def scene(self) -> ClutterScene:
+        """What its cameras saw, and where its objects lie."""
+        return read_scene(self.job.scenes, self.job.scene_index)
+
+    @cached_property
+    def surfaces(self) -> RayScene:
+        """Its true surfaces."""
+        meshes = {name: item.mesh for name, (item, _) in catalogue(self.job.objects).items()}
+        return scene_surfaces(self.scene, meshes, self.job.config.scenes.table_side_m)
+
+    def labelled(self, portion: Portion) -> list[GraspMessage]:
+        """Label a portion of its grasps; the first is drawn from the stream of the scene."""
+        config, stream = self.job.config, (portion.number,) if portion.number else ()
+        rng = generator(config.seed, "grasps", self.scene.scene_id, *stream)
+        batches = label_scene(self.scene, self.surfaces, config, portion.grasps, rng)
+        size, rounded = config.grasps.samples_per_message, config.sensing.rounded
+        return grasp_messages(batches, size, rounded, portion.key)
 
 
 def examined(shard: Path) -> ShardResult:

@@ -84,7 +84,19 @@ class GraspsConfig(ScaledSection):
     normal_radius_m: ClassVar[LengthInMetres] = LengthInMetres()
     clearance_m: ClassVar[LengthInMetres] = LengthInMetres()
 
-    count: int = Field(5000, ge=1, description="labelled grasps wanted in all")
+    count: int = Field(
+        5000, ge=1, description="labelled grasps wanted in all, shared out among the scenes"
+    )
+    per_scene: int = Field(
+        0, ge=0, description="grasps of a portion of each scene, whatever the count; 0: the count"
+    )
+    portions: int = Field(
+        1,
+        ge=1,
+        le=1000,
+        description="portions of each scene, each drawn and balanced by itself: with more of them "
+        "the first stay what they are; needs per_scene",
+    )
     oversampling: float = Field(
         3.0, ge=1, le=20, description="candidates labelled per grasp kept, to flatten the labels"
     )
@@ -133,6 +145,29 @@ class GraspsConfig(ScaledSection):
         "the sensors' noise",
     )
     samples_per_message: int = Field(256, ge=1, le=8192)
+
+    @model_validator(mode="after")
+    def _portions_are_of_a_scene(self) -> Self:
+        if self.portions > 1 and not self.per_scene:
+            raise ValueError("portions are of per_scene grasps each: give per_scene")
+        return self
+
+    def of_scenes(self, scenes: int) -> list[list[int]]:
+        """Share out the grasps that are wanted.
+
+        Parameters
+        ----------
+        scenes
+            How many scenes there are.
+
+        Returns
+        -------
+        Grasps of each portion of each scene.
+        """
+        if self.per_scene:
+            return [[self.per_scene] * self.portions] * scenes
+        share, more = divmod(self.count, scenes)
+        return [[share + (index < more)] for index in range(scenes)]
 
 
 class SensingConfig(ScaledSection):

@@ -3,6 +3,9 @@
 from pipeline.config.scenes import ClutterCounts, ScenesConfig
 from pipeline.config.tree import RunConfig
 
+# Their sections say how many grasps are labelled in all.
+SHARED_OUT = {"per_scene": 0, "portions": 1}
+
 
 def judged_config(config: RunConfig) -> RunConfig:
     """Configuration of the run that `make referee` makes within a run.
@@ -33,7 +36,7 @@ def judged_config(config: RunConfig) -> RunConfig:
             "split": config.split.model_copy(update={"families": families}),
             "scenes": config.scenes.model_copy(update=scenes),
             "grasps": config.grasps.model_copy(
-                update={"count": config.agreement.labelled, "noise_draws": 1}
+                update={"count": config.agreement.labelled, "noise_draws": 1} | SHARED_OUT
             ),
         }
     )
@@ -68,7 +71,7 @@ def holdout_config(config: RunConfig) -> RunConfig:
                     "clutters_per_level": ClutterCounts(test=wanted.clutters_per_level),
                 }
             ),
-            "grasps": config.grasps.model_copy(update={"count": wanted.labelled}),
+            "grasps": config.grasps.model_copy(update={"count": wanted.labelled} | SHARED_OUT),
             "evaluate": config.evaluate.model_copy(
                 update={"split": "test", "policies": wanted.policies}
             ),
@@ -97,7 +100,9 @@ def folds_config(config: RunConfig, folds: int) -> RunConfig:
                     "clutters_per_level": ClutterCounts(test=wanted.clutters_per_level),
                 }
             ),
-            "grasps": config.grasps.model_copy(update={"count": -(-wanted.labelled // folds)}),
+            "grasps": config.grasps.model_copy(
+                update={"count": -(-wanted.labelled // folds)} | SHARED_OUT
+            ),
             "network": wanted.network,
             "train": config.train.model_copy(update={"epochs": wanted.epochs}),
         }

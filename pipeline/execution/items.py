@@ -25,7 +25,7 @@ SCENE_COUNTS = (
     *("scenes.levels", "scenes.clutters_per_level", "scenes.splits", "scenes.impossible"),
     "scenes.test_seed",  # in the seed of each scene that it decides
 )
-GRASP_COUNTS = ("grasps.count",)
+GRASP_COUNTS = ("grasps.count", "grasps.per_scene", "grasps.portions")
 
 
 def items_basis(
@@ -84,6 +84,11 @@ def object_key(basis: str, item: MeasuredObject, masses: Mapping[str, float]) ->
 def scenes_basis(key: Key, config: RunConfig) -> str:
     """What all scenes of stage scenes, whose key is given, rest on."""
     return items_basis(key, config, ("scenes", "cameras"), SCENE_COUNTS)
+
+
+def grasps_basis(key: Key, config: RunConfig) -> str:
+    """What the grasps of all scenes of stage grasps, whose key is given, rest on."""
+    return items_basis(key, config, ("seed", "gripper", "sensing", "grasps"), GRASP_COUNTS)
 
 
 def with_scene_key(

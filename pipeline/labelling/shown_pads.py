@@ -12,6 +12,7 @@ from pipeline.gripper.quality import triangle_pressure
 from pipeline.labelling.grasps import LabelledGrasps
 from pipeline.labelling.heights import pad_heights
 from pipeline.labelling.poses import pad_of
+from pipeline.spread import choose_evenly
 from pipeline.world.raycasting import Surfaces
 
 # Scenes, spread over the run, whose shards hold draped pads: more make a recording slow to open.
@@ -35,6 +36,31 @@ class ShownPads:
     grasp: Integer[np.ndarray, " k"]
     height_m: Float[np.ndarray, "k v"]
     pressure: Float[np.ndarray, "k t"]
+
+
+def drape_some_again(
+    batches: Sequence[LabelledGrasps], wanted: int, surfaces: Surfaces, config: RunConfig
+) -> ShownPads:
+    """Drape the pads of some grasps of one scene again, from its worst label to its best.
+
+    Parameters
+    ----------
+    batches
+        All grasps of the scene, in their order.
+    wanted
+        How many at most.
+    surfaces
+        The true surfaces of the scene.
+    config
+        Sections grasps and gripper.
+
+    Returns
+    -------
+    Heights and pressures, by rising label.
+    """
+    quality = np.concatenate([batch.quality for batch in batches])
+    chosen = np.argsort(quality, kind="stable")[choose_evenly(len(quality), wanted)]
+    return drape_again(batches, chosen, surfaces, config)
 
 
 def drape_again(

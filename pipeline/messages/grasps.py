@@ -1,13 +1,16 @@
 """Labelled grasps ↔ softgrip.v1.GraspBatch and CloudBatch, shown pads ↔ softgrip.v1.DrapedPads."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from itertools import accumulate
+from pathlib import Path
 
 import numpy as np
 
-from pipeline.artifacts.reading import Artifact
+from pipeline.artifacts.reading import Artifact, open_artifact
 from pipeline.artifacts.tensors import set_tensors, tensors_of
 from pipeline.artifacts.writing import ArtifactWriter
-from pipeline.errors import ContentError
+from pipeline.errors import ArtifactError, ContentError
 from pipeline.labelling.grasps import GraspOrigin, LabelledGrasps
 from pipeline.labelling.shown_pads import ShownPads
 from pipeline.messages.clouds import cloud_batch, clouds_beside, with_clouds, write_apart
@@ -51,6 +54,8 @@ PADS_SHAPES = {"grasp": "k", "height_m": "k v", "pressure": "k t"}
 
 TOPIC, PADS_TOPIC = "/grasps", "/pads"
 
+GraspMessage = tuple[GraspBatch, CloudBatch]
+
 
 def write_grasps(
     artifact: ArtifactWriter,
@@ -78,16 +83,74 @@ def write_grasps(
     -------
     How many grasps were written.
     """
-    parts, written = [], 0
-    for origin, grasps in batches:
-        for start in range(0, len(grasps), size):
-            part = grasps.rows(start, min(start + size, len(grasps)))
-            parts.append((written, origin, part))
-            written += len(part)
-    rows = ((at, grasp_batch(origin, part, key)) for at, origin, part in parts)
-    clouds = ((at, cloud_batch(part.cloud, part.cloud_mask, rounded)) for at, _, part in parts)
+    return write_messages(artifact, grasp_messages(batches, size, rounded, key))
+
+
+def grasp_messages(
+    batches: Sequence[tuple[GraspOrigin, LabelledGrasps]], size: int, rounded: bool, key: str
+) -> list[GraspMessage]:
+    """The messages of a portion of a scene's grasps.
+
+    Parameters
+    ----------
+    batches
+        The grasps by viewpoint.
+    size
+        Most grasps in a message.
+    rounded
+        Whether clouds may be rounded to steps.
+    key
+        Digest of what the portion rests on.
+
+    Returns
+    -------
+    Rows, and their clouds.
+    """
+    return [
+        (grasp_batch(origin, part, key), cloud_batch(part.cloud, part.cloud_mask, rounded))
+        for origin, grasps in batches
+        for start in range(0, len(grasps), size)
+        for part in [grasps.rows(start, min(start + size, len(grasps)))]
+    ]
+
+
+def write_messages(artifact: ArtifactWriter, messages: Sequence[GraspMessage]) -> int:
+    """Write rows, each at the number of its first grasp, and apart from them their clouds.
+
+    Parameters
+    ----------
+    artifact
+        The shard.
+    messages
+        Rows and their clouds, in order.
+
+    Returns
+    -------
+    How many grasps were written.
+    """
+    counts = [rows.quality.shape[0] for rows, _ in messages]
+    starts = list(accumulate(counts, initial=0))[:-1]
+    rows = [(at, rows) for at, (rows, _) in zip(starts, messages, strict=True)]
+    clouds = [(at, clouds) for at, (_, clouds) in zip(starts, messages, strict=True)]
     write_apart(artifact, TOPIC, rows, clouds)
-    return written
+    return sum(counts)
+
+
+def portions_by_key(folder: Path) -> dict[str, Path]:
+    """Key of each portion of grasps → the shard in a folder that holds it; no cloud is read."""
+    found: dict[str, Path] = {}
+    for shard in sorted(folder.glob("*.mcap")):
+        with suppress(ArtifactError), open_artifact(shard) as artifact:  # such are made anew
+            found |= {rows.key: shard for _, rows in artifact.messages(GraspBatch) if rows.key}
+    return found
+
+
+def read_portion(shard: Path, key: str) -> list[GraspMessage]:
+    """The messages of one portion of grasps; none where the shard does not hold it any more."""
+    with suppress(ArtifactError), open_artifact(shard) as artifact:  # made anew
+        pairs = with_clouds(artifact, GraspBatch)
+        return [(rows, clouds) for rows, clouds in pairs if rows.key == key and clouds]
+    return []
 
 
 def read_grasps(

@@ -126,14 +126,18 @@ def read_placed(path: Path, index: int) -> tuple[PlacedObject, ...]:
         return _placed(message)
 
 
+def read_keys(path: Path) -> list[str]:
+    """The key of every scene, in order; no image is read."""
+    with open_artifact(path) as artifact:
+        return [scene.key for _, scene in artifact.messages(scenes_pb2.Scene)]
+
+
 def numbers_by_key(path: Path) -> dict[str, int]:
     """Key → number of each scene of an artifact; none where it is not there or cannot be read."""
     try:
-        with open_artifact(path) as artifact:
-            scenes = [scene for _, scene in artifact.messages(scenes_pb2.Scene)]
+        return {key: number for number, key in enumerate(read_keys(path)) if key}
     except ArtifactError:
         return {}  # made anew, all of it
-    return {scene.key: number for number, scene in enumerate(scenes) if scene.key}
 
 
 def read_placements(path: Path) -> dict[str, tuple[PlacedObject, ...]]:
