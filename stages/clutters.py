@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pipeline.artifacts import Provenance
 from pipeline.clutter.building import build_clutter
-from pipeline.clutter.levels import level_of
+from pipeline.clutter.levels import clutter_ids, level_of
 from pipeline.clutter.settled import SettledClutter, SettledClutters
 from pipeline.config import RunConfig
 from pipeline.errors import SceneError
@@ -48,8 +48,7 @@ def scene_jobs(stage: StageContext, known: SettledClutters) -> list[SceneJob]:
     shared = (stage.upstream("objects"), stage.config, stage.provenance(), known.basis)
     jobs = []
     for level, split in product(sorted(stage.config.scenes.levels), stage.config.scenes.splits):
-        for number in range(getattr(counts, split)):
-            scene_id = f"level{level}-{split}-{number:02d}"
+        for scene_id in clutter_ids(level, split, getattr(counts, split)):
             path = stage.folder.state("scenes") / f"{scene_id}.mcap"
             job = SceneJob(scene_id, level, split, path, None, *shared)
             settled = known.stands(scene_id, job.drawn_from, pool_of(job))

@@ -28,7 +28,8 @@ from pipeline.execution.staleness import (
     why_stale,
 )
 from pipeline.geometry.mesh_folders import list_mesh_files
-from pipeline.housekeeping.forecast import Forecast, as_lines, forecast, total_s
+from pipeline.housekeeping.forecast import Forecast, as_lines, forecast, total_s, work_of
+from pipeline.housekeeping.kept import taken_over
 from pipeline.housekeeping.listing import run_folders
 from stages.graph import EVALUATE, MADE, OBJECTS, RUNS_DIR, SHARDS, STAGES, inputs_of
 
@@ -135,10 +136,15 @@ def planned(folder: RunFolder, mesh_dir: Path | None, goals: list[str]) -> list[
     embedded = not meshes or config.objects.embedded_in_training
     sources = min(limit, len(meshes)) + (len(PARAMETRIC_OBJECTS) if embedded else 0)
     others = list(run_folders(RUNS_DIR))
+
+    def context_of(name: str) -> StageContext:
+        return stage_context(MADE[name], folder, inputs_of, mesh_dir, workers=1)
+
     return [
-        forecast(name, reason, config, sources, others)
+        forecast(name, reason, config, sources, others, kept)
         for name, reason in reasons(folder, mesh_dir, wanted).items()
         if reason and not reason.startswith(RECORDING_ALONE)
+        for kept in [taken_over(name, context_of, work_of(name, config, sources))]
     ]
 
 

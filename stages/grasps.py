@@ -89,8 +89,7 @@ class ShardResult:
 def build(stage: StageContext) -> Summary:
     """Synthesize labelled grasps on every scene, one shard a scene."""
     scenes, config, former = stage.upstream("scenes"), stage.config, portions_by_key(stage.shards)
-    keys = read_keys(scenes)
-    count = len(keys)
+    count = len(keys := read_keys(scenes))
     recorded = choose_evenly(count, SHOWN_SCENES)
     basis = grasps_basis(stage.key, config)
     pads = max(1, config.recording.grasps // len(recorded))
@@ -119,7 +118,8 @@ def build(stage: StageContext) -> Summary:
     write_index(stage.output, stage.provenance(), entries, quality_histogram(quality))
     taken_over = sum(result.taken_over for result in results)
     made = sum(len(job.portions) for job in jobs) - taken_over
-    return summary(results, quality, config) | {"taken_over": taken_over, "made": made}
+    grown = {"taken_over": taken_over, "made": made, "items_basis": basis}
+    return summary(results, quality, config) | grown
 
 
 def synthesize_shard(job: ShardJob) -> ShardResult:

@@ -78,6 +78,7 @@ def build(stage: StageContext) -> Summary:
     figures = {"stretched_near_held_out": near, "solids_near_held_out": solids_near, **plan.figures}
     taken_over = sum(item.key in former for item in objects[: len(objects) - len(stretched)])
     figures |= {"taken_over": taken_over, "made": len(objects) - taken_over}
+    figures |= {"items_basis": objects_basis(stage.key, stage.config)}
     return summary(objects, split, left_out.refused) | figures
 
 

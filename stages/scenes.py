@@ -58,7 +58,8 @@ def build(stage: StageContext) -> Summary:
     shutil.rmtree(stage.folder.state("scenes"), ignore_errors=True)  # none where all were kept
     taken_over = sum(path == stage.output for path, _ in kept.values())
     figures = {"taken_over": taken_over, "made": len(scenes) - taken_over, "left_out": left_out}
-    return summary(scenes, keys) | figures | {"render_share": clock.share()}
+    figures |= {"items_basis": basis, "render_share": clock.share()}
+    return summary(scenes, keys) | figures
 
 
 def make_scenes(

@@ -37,3 +37,8 @@ def level_of(level: int) -> tuple[ShapeClass, Distribution]:
         raise ValueError(f"levels go from 1 to 9 (Table II), got {level}")
     row, column = divmod(level - 1, 3)
     return list(ShapeClass)[row], list(Distribution)[column]
+
+
+def clutter_ids(level: int, split: str, count: int) -> list[str]:
+    """Names of the first clutters of a level that are built of a split's objects."""
+    return [f"level{level}-{split}-{number:02d}" for number in range(count)]

@@ -22,7 +22,9 @@ class Taken:
     run
         Name of the run.
     units
-        How much work [units of `work_of`].
+        How much work its artifact is [units of `work_of`].
+    made
+        How much of it was made, and not taken over from an earlier artifact [the same].
     wall_time_s
         Wall time [s].
     size_bytes
@@ -31,6 +33,7 @@ class Taken:
 
     run: str
     units: float
+    made: float
     wall_time_s: float
     size_bytes: int
 
@@ -80,19 +83,20 @@ def work_of(stage: str, config: RunConfig, sources: int) -> float:
     per_level = config.scenes.clutters_per_level
     clutters = {split: getattr(per_level, split) for split in config.scenes.splits}
     levels = len(config.scenes.levels)
+    grasps = sum(map(sum, config.grasps.of_scenes(max(levels * sum(clutters.values()), 1))))
     if stage == "objects":
         trained = 1 - config.split.val_fraction - config.split.test_fraction
         return sources * (1 + trained * config.objects.stretched_copies)
     if stage == "scenes":
         return float(levels * sum(clutters.values()))
     if stage == "train":
-        return float(config.grasps.count * config.train.epochs)
+        return float(grasps * config.train.epochs)
     if stage == "evaluate":
         picked = clutters.get(config.evaluate.split, 0)
         robot = config.evaluate.imperfection
         again = min(picked, robot.curve_clutters) * len(robot.curve_policies) * len(robot.curve)
         return float(levels * (picked * len(config.evaluate.policies) + again))
-    return float(config.grasps.count)
+    return float(grasps)
 
 
 def work_done(stage: str, summary: dict[str, Any]) -> float:
@@ -106,6 +110,12 @@ def work_done(stage: str, summary: dict[str, Any]) -> float:
         return samples * float(summary.get("epochs", 0))
     groups = [summary.get("policies", {}), *summary.get("imperfection", {}).values()]
     return float(sum(found.get("clutters", 0) for group in groups for found in group.values()))
+
+
+def share_made(summary: dict[str, Any]) -> float:
+    """Share of a stage's items that were made, and not taken over [1]; 1 where it is not told."""
+    made, kept = float(summary.get("made", 0)), float(summary.get("taken_over", 0))
+    return made / (made + kept) if made + kept > 0 else 1.0
 
 
 def _counts(value: object) -> list[float]:
@@ -133,7 +143,8 @@ def taken_by(folder: RunFolder, stage: str, config: RunConfig) -> Taken | None:
     """
     summary = read_summary(folder, stage)
     units = work_done(stage, summary) if summary else 0.0
-    if units <= 0 or not folder.artifact(stage).is_file():
+    made = units * share_made(summary)
+    if made <= 0 or not folder.artifact(stage).is_file():
         return None
     if stage == "train" and (
         summary.get("layers") != config.network.layers
@@ -142,11 +153,16 @@ def taken_by(folder: RunFolder, stage: str, config: RunConfig) -> Taken | None:
         return None
     files = (folder.artifact(stage), folder.shards(stage), folder.recording(stage))
     size = sum(map(disk_use_bytes, files))
-    return Taken(folder.path.name, units, float(summary["wall_time_s"]), size)
+    return Taken(folder.path.name, units, made, float(summary["wall_time_s"]), size)
 
 
 def forecast(
-    stage: str, reason: str, config: RunConfig, sources: int, others: Sequence[RunFolder]
+    stage: str,
+    reason: str,
+    config: RunConfig,
+    sources: int,
+    others: Sequence[RunFolder],
+    kept: float = 0.0,
 ) -> Forecast:
     """Scale what the run of most equal work took.
 
@@ -162,20 +178,23 @@ def forecast(
         Meshes and embedded objects that stage objects reads.
     others
         Runs that may tell; the run itself, made earlier, among them.
+    kept
+        How much of the work is there already and is taken over [units of `work_of`].
 
     Returns
     -------
-    Time and disk, proportional to the work; none where no run tells.
+    Time, proportional to the work that is left, and disk, to all of it; none where no run tells.
     """
     units = work_of(stage, config, sources)
+    new = max(units - kept, 0.0)
+    if kept > 0:
+        reason += f"; {min(kept, units):.0f} of {units:.0f} {stage} are taken over"
     told = [taken for folder in others if (taken := taken_by(folder, stage, config))]
     if not told or units <= 0:
         return Forecast(stage, reason)
-    nearest = min(told, key=lambda taken: abs(math.log(taken.units / units)))
-    share = units / nearest.units
-    return Forecast(
-        stage, reason, nearest.wall_time_s * share, nearest.size_bytes * share, nearest.run
-    )
+    nearest = min(told, key=lambda taken: abs(math.log(taken.made / (new or units))))
+    time_s = nearest.wall_time_s * new / nearest.made
+    return Forecast(stage, reason, time_s, nearest.size_bytes * units / nearest.units, nearest.run)
 
 
 def duration_in_words(seconds: float) -> str:

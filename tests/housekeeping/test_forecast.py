@@ -71,6 +71,17 @@ def test_time_and_disk_are_scaled_from_the_run_of_most_equal_work(
     assert found == Forecast("grasps", "never made", 30.0, (40_000 + own) / 2, "large")
 
 
+def test_what_is_taken_over_takes_no_time(tmp_path: Path, config: RunConfig) -> None:
+    folder = make_run(tmp_path / "grown")
+    make_stage(folder, "grasps", grasps=4000, taken_over=3, made=1, wall_time_s=10.0)
+    found = forecast("grasps", "input changed", config, 20, [folder], kept=3000.0)
+    assert found.wall_time_s == pytest.approx(20.0)  # 2000 to make, as 1000 took 10 s
+    assert found.size_bytes == pytest.approx(folder.artifact("grasps").stat().st_size * 5 / 4)
+    assert found.reason == "input changed; 3000 of 5000 grasps are taken over"
+    make_stage(folder, "grasps", grasps=4000, taken_over=4, made=0, wall_time_s=0.1)
+    assert forecast("grasps", "x", config, 20, [folder]) == Forecast("grasps", "x")
+
+
 def test_another_network_tells_nothing_of_training(tmp_path: Path, config: RunConfig) -> None:
     folder = make_run(tmp_path / "other")
     like = {"samples": {"train": 5000}, "epochs": 4, "wall_time_s": 120.0}

@@ -3,6 +3,7 @@
 Objects, scenes and grasps are made in this process, of boxes, after every addition and removal.
 """
 
+import json
 import random
 import shutil
 from collections.abc import Callable, Iterator
@@ -14,13 +15,14 @@ import pytest
 import trimesh
 
 from pipeline.clutter.settled import CLUTTERS_FILE
-from pipeline.execution import Isolation, RunFolder
+from pipeline.execution import Isolation, RunFolder, StageContext
 from pipeline.execution.staleness import stage_context
 from pipeline.geometry.settled import SETTLED_FILE
+from pipeline.housekeeping.kept import taken_over
 from pipeline.messages.objects import read_objects
 from pipeline.messages.scenes import read_placements
 from stages import grasps, objects, scenes
-from stages.graph import GRASPS, OBJECTS, SCENES, inputs_of
+from stages.graph import GRASPS, MADE, OBJECTS, SCENES, inputs_of
 
 CONFIG = """
 seed = 3
@@ -76,14 +78,26 @@ class Grown:
 
     def make(self, stages: int = 3) -> list[tuple[int, int]]:
         """The first stages; how many items of each were taken over, and how many were made."""
-        config = CONFIG.format(clutters=self.clutters, portions=self.portions)
-        self.folder.config.write_text(config)
+        self.configure()
         told = []
         for stage, build in STAGES[:stages]:
-            context = stage_context(stage, self.folder, inputs_of, self.meshes, workers=1)
-            figures = build(context)
+            figures = build(self.context(stage.name))
             told.append((figures["taken_over"], figures["made"]))
+            summary = figures | {"stage": stage.name, "wall_time_s": 1.0}
+            self.folder.summary(stage.name).write_text(json.dumps(summary))
         return told
+
+    def configure(self) -> None:
+        config = CONFIG.format(clutters=self.clutters, portions=self.portions)
+        self.folder.config.write_text(config)
+
+    def context(self, stage: str) -> StageContext:
+        return stage_context(MADE[stage], self.folder, inputs_of, self.meshes, workers=1)
+
+    def planned(self) -> list[float]:
+        """What a plan says that will be taken over of each stage."""
+        self.configure()
+        return [taken_over(stage.name, self.context, 1e6) for stage, _ in STAGES]
 
     def files(self) -> dict[str, bytes]:
         """All that is made: name → bytes."""
@@ -136,9 +150,11 @@ def test_only_what_is_new_is_made(tmp_path: Path, splits: str, first: list[int])
     run.add(*first)
     assert run.make() == [(0, len(first)), (0, 3), (0, 3)]
     run.add(*new)
+    assert run.planned() == [len(first), 3, 3 * 12]
     assert run.make() == [(len(first), len(new)), (3, 0), (3, 0)]
     run.clutters = 3
     run.portions = 2
+    assert run.planned() == [7, 3, 3 * 12]
     assert run.make() == [(7, 0), (3, 2), (3, 7)]
     later = read_placements(run.folder.artifact("scenes"))
     placed = {one.object_name for scene in later.values() for one in scene}
@@ -158,6 +174,7 @@ def test_what_is_removed_takes_its_scenes_along_alone(tmp_path: Path, splits: st
     assert 0 < len(holding) < len(before)
     run.remove(int(gone.removeprefix("box_")))
     kept, made = len(before) - len(holding), len(holding)
+    assert run.planned()[1:] == [kept, kept * 12]
     assert run.make() == [(6, 0), (kept, made), (kept, made)]
     after = read_placements(run.folder.artifact("scenes"))
     for scene in after.keys() - holding:
