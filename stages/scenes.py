@@ -1,6 +1,7 @@
 """Stage 2, scenes: objects → clutter of the nine levels, settled and rendered in SAPIEN."""
 
 import shutil
+import time
 from collections import Counter, deque
 from collections.abc import Collection, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -31,6 +32,7 @@ from pipeline.execution import (
 )
 from pipeline.execution.busy import BusyClock
 from pipeline.execution.items import scene_key, scenes_basis
+from pipeline.execution.rendering_nodes import run_on_rendering_nodes
 from pipeline.messages.objects import catalogue
 from pipeline.messages.scenes import numbers_by_key, read_scene, write_scene
 from pipeline.recording.scenes import draw_scenes
@@ -71,27 +73,27 @@ def make_scenes(
 ) -> tuple[list[ClutterScene], dict[str, str]]:
     """Settle, render and write clutters; the scenes, and why others are left out.
 
-    Finished scenes lie in files of their own. Workers settle; this process renders: a renderer
-    keeps the GPU or all cores busy by itself; a thread writes what is rendered.
+    Finished scenes lie in files of their own. Workers settle; one process a node renders, for a
+    renderer keeps the GPU or all cores busy by itself; a thread writes what is rendered.
     """
     left_out: dict[str, str] = {}
     missing = [job for job in jobs if job.scene_id not in kept]
     settled = run_in_order(settled_clutter, missing, stage.workers, stage.executor, AHEAD)
-    built = iter(progress(settled, len(missing), "scenes", "scene"))
+    asked, built = stage.config.cameras.renderer, zip(missing, settled, strict=True)
+    rendered = run_on_rendering_nodes(rendered_scene, built, stage.executor, asked)
+    made = iter(progress(rendered, len(missing), "scenes", "scene"))
     renderer = renderer_of(stage.config).name
     scenes: list[ClutterScene] = []
     with ThreadPoolExecutor(1) as writer:
         writes: deque[Future[None]] = deque()
         for job in jobs:
             if job.scene_id not in kept:
-                clutter = next(built)
-                if isinstance(clutter, SceneError):
-                    logger.warning("left out: {}: {}", job.scene_id, clutter)
-                    left_out[job.scene_id] = clutter.what
+                seen, busy_s = next(made)
+                if isinstance(seen, SceneError):
+                    logger.warning("left out: {}: {}", job.scene_id, seen)
+                    left_out[job.scene_id] = seen.what
                     continue
-                seen = render(job, clutter, clock)
-                with ArtifactWriter(job.path, job.provenance) as own:
-                    write_scene(own, 0, seen, renderer)
+                clock.book(busy_s)
             else:
                 seen = read_scene(*kept[job.scene_id])
             writes.append(writer.submit(write_scene, artifact, len(scenes), seen, renderer))
@@ -121,15 +123,28 @@ def kept_scenes(jobs: list[SceneJob], former: Path) -> dict[str, tuple[Path, int
     return kept
 
 
-def render(job: SceneJob, scene: ClutterScene, clock: BusyClock) -> ClutterScene:
-    """The scene with its views."""
+def rendered_scene(
+    built: tuple[SceneJob, ClutterScene | SceneError],
+) -> tuple[ClutterScene | SceneError, float]:
+    """The scene with its views, kept in a file of its own, and the seconds it took to render."""
+    job, clutter = built
+    if isinstance(clutter, SceneError):
+        return clutter, 0.0
+    renderer, began = renderer_of(job.config), time.perf_counter()
+    seen = with_views(job, clutter, renderer)
+    busy_s = time.perf_counter() - began
+    with ArtifactWriter(job.path, job.provenance) as artifact:
+        write_scene(artifact, 0, seen, renderer.name)
+    return seen, busy_s
+
+
+def with_views(job: SceneJob, scene: ClutterScene, renderer: Renderer) -> ClutterScene:
+    """The scene as each of its cameras sees it."""
     objects = {name: item for name, (item, _) in catalogue(job.objects).items()}
     rng = generator(job.seed, "cameras", job.scene_id)
     centres = np.array([placed.world_from_object[:3, 3] for placed in scene.objects])
     cameras = scene_cameras(job.config.cameras, centres, rng)
-    renderer = renderer_of(job.config)
-    with clock.busy():
-        return render_views(scene, objects, cameras, renderer)
+    return render_views(scene, objects, cameras, renderer)
 
 
 @lru_cache(maxsize=1)

@@ -64,6 +64,8 @@ def test_six_stages_from_cold_write_the_bytes_of_local_processes_though_a_node_d
     cluster.remove_node(nodes[0], allow_graceful=False)  # type: ignore[attr-defined]
     _, errors = dataset.communicate(timeout=PATIENCE_S)
     assert dataset.returncode == 0, errors[-3000:]
+    assert "renders nothing" not in errors  # both nodes are this machine, with its renderer
+    assert "renders itself" not in errors
     judged = subprocess.run(
         ["make", "eval", "RUN=ci", "EXECUTOR=ray"],
         cwd=copy,
