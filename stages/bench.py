@@ -15,6 +15,7 @@ import numpy as np
 from pipeline.artifacts import publish_bytes
 from pipeline.benchmarks import clutter, control, inference, labelling, loading, solvers, storage
 from pipeline.benchmarks.cutting import cutting_time
+from pipeline.benchmarks.shuffling import shuffle_peaks
 from pipeline.config import RunConfig, load_run_config
 from pipeline.execution import RunFolder, generator, run_command, run_in_order
 from pipeline.geometry.catalogue import CatalogueObject
@@ -34,7 +35,6 @@ PROBLEM_GRASPS = 1200  # of one scene: problems of all kinds
 MESH_GRASPS = 2048  # a mesh size: enough for rates known to a percent
 STORED_SAMPLES = 8192  # more than any cache of a disk hides
 WORKER_SECONDS = 6.0  # a number of workers is timed for so long
-
 
 Measure = Callable[[], dict[str, object]]
 
@@ -72,14 +72,14 @@ def measure_all() -> None:
         lambda: scaling(bench),
         lambda: storage.figures(samples),
         lambda: loading.figures(samples),
+        shuffle_peaks,
         lambda: inference.figures(config.network, samples),
         lambda: control.figures(scene, bench.meshes, config),
         lambda: clutter.figures(bench.objects.values(), config.scenes),
         lambda: cutting_time(bench.objects.values(), config.objects.convex),
     )
     for measure in measures:
-        found = measure()
-        figures |= found
+        figures |= (found := measure())
         sys.stdout.write(json.dumps(found, indent=1) + "\n")
         sys.stdout.flush()
     peak_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -24,6 +24,7 @@ from pipeline.config.written import as_toml
 from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder, run_command
 from pipeline.execution.running import read_summary
+from pipeline.messages.grasp_samples import read_all_grasps
 from pipeline.messages.training import EXPORT
 from pipeline.network.by_object import ObjectError, check_labels, errors_by_object, macro_error
 from pipeline.network.control_inference import ControlPredictor
@@ -40,7 +41,6 @@ from pipeline.reporting.holdout import as_markdown
 from pipeline.reporting.page import html_page
 from pipeline.spread import choose_evenly
 from stages.graph import GIVEN_NETWORK, RUNS_DIR
-from stages.shards import gather
 
 NAME = "holdout"
 NOTE = "network.json"  # what the network was called when it was given
@@ -126,7 +126,7 @@ def measure(run: RunName = "default", runs_dir: RunsDir = RUNS_DIR) -> None:
 def labelled(folder: RunFolder) -> tuple[tuple[str, ...], Samples]:
     """All labelled grasps, and the names of their objects. Raises ArtifactError on bad labels."""
     index = folder.artifact("grasps")
-    names, by_split = gather(index)
+    names, by_split = read_all_grasps(index)
     if "test" not in by_split:
         raise ArtifactError(f"{index} holds no grasp", "Delete it and run make holdout again")
     samples = by_split["test"]

@@ -16,6 +16,7 @@ from pipeline.artifacts import publish_bytes, read_provenance
 from pipeline.config import load_run_config
 from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder, generator, run_command
+from pipeline.messages.grasp_samples import read_all_grasps
 from pipeline.messages.training import CHECKPOINT, EXPORT
 from pipeline.network.by_object import errors_by_object, macro_error
 from pipeline.network.control_inference import ControlPredictor
@@ -32,7 +33,6 @@ from pipeline.network.released_files import (
 from pipeline.network.sources import baseline_to_json, sha256_of
 from pipeline.spread import choose_evenly
 from stages.graph import RUNS_DIR
-from stages.shards import gather
 
 TEST_GRASPS = 600  # 2 MiB: on which a fine-tuned network shows what it forgot
 FITTED = 4000  # training samples that the baselines are fitted to, as for the first release
@@ -50,7 +50,7 @@ def release(
     for path in (trained / EXPORT, trained / CHECKPOINT, folder.artifact("grasps")):
         if not path.is_file():
             raise ArtifactError(f"{path} is missing", f"Make it first: make train RUN={run}")
-    names, by_split = gather(folder.artifact("grasps"))
+    names, by_split = read_all_grasps(folder.artifact("grasps"))
     train_set, test_set = by_split["train"], by_split["test"]
     order = generator(config.seed, "release").permutation(len(train_set))[:FITTED]
     fit = train_set.take(np.sort(order))

@@ -1,122 +1,117 @@
-"""Stage 4, shards: labelled grasps → shuffled train, val and test shards, split by object."""
+"""Stage 4, shards: labelled grasps → shuffled train, val and test shards, split by object.
 
-from collections import Counter
+Samples are shuffled in two passes (pipeline/network/shuffling), each in as many processes as there
+are: first grasps are scattered to parts, then each part is permuted and becomes some shards.
+"""
+
+import shutil
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from pipeline.artifacts import ArtifactWriter, open_artifact
-from pipeline.artifacts.sharding import (
-    is_current,
-    listed_shards,
-    shard_entry,
-    shard_path,
-    write_index,
-)
-from pipeline.clutter.levels import level_of
+from pipeline.artifacts.room import require_room
+from pipeline.artifacts.sharding import is_current, write_index
 from pipeline.errors import ArtifactError
-from pipeline.execution import StageContext, Summary, generator, progress, stage_command
-from pipeline.labelling.balancing import proposal_weights, quality_histogram
-from pipeline.labelling.grasps import GraspOrigin, LabelledGrasps
-from pipeline.messages.grasps import read_grasps
-from pipeline.messages.samples import write_samples
-from pipeline.network.samples import SPLITS, Samples, join_samples
+from pipeline.execution import StageContext, Summary, progress, run_in_order, stage_command
+from pipeline.execution.shuffle_plan import Part, ShufflePlan, plan_shuffle
+from pipeline.execution.shuffling import Gathered, GatherJob, ScatterJob, gather, scatter_group
+from pipeline.messages.samples import object_names_in
+from pipeline.network.samples import SPLITS
 from pipeline.recording.shards import draw_shards
-from schemas.softgrip.v1.grasps_pb2 import ShardEntry
 from stages.graph import SHARDS, inputs_of
 
 
 def build(stage: StageContext) -> Summary:
     """Shuffle the labelled grasps across scenes and write them as training shards."""
-    names, by_split = gather(stage.upstream("grasps"))
-    entries: list[ShardEntry] = []
+    plan = plan_shuffle(stage.config, stage.upstream("grasps"), stage.shards)
     for split in SPLITS:
-        samples = by_split.get(split)
-        if samples is None:
+        if not any(part.split == split for part in plan.parts):
             raise ArtifactError(
                 f"There is no grasp of the {split} split in {stage.upstream('grasps')}",
                 f"Give scenes.clutters_per_level.{split} at least one clutter",
             )
-        order = generator(stage.config.seed, "shuffle", split).permutation(len(samples))
-        entries += write_split(stage, split, samples.take(order), names)
-    every = join_samples([by_split[split] for split in SPLITS])
-    histogram = quality_histogram(every.quality.astype(np.float64))
+    workers = min(stage.workers, len(plan.groups))  # a small run is done before another starts
+    names = scatter(stage, plan, workers)
+    jobs = [
+        GatherJob(
+            part,
+            tuple(files_of(stage, part).values()),
+            names,
+            stage.config,
+            stage.provenance(),
+            stage.output.parent,
+        )
+        for part in plan.parts
+    ]
+    done = run_in_order(gather, jobs, workers, stage.executor)
+    gathered = list(progress(done, len(jobs), "shards: permuting", "part"))
+    entries = [entry for found in gathered for entry in found.entries]
+    histogram = np.sum([found.quality for found in gathered], axis=0)
     write_index(stage.output, stage.provenance(), entries, histogram)
-    return summary(entries, by_split, names)
+    shutil.rmtree(scattered(stage).parent)
+    return summary(plan.parts, gathered, names)
 
 
-def gather(grasps: Path) -> tuple[tuple[str, ...], dict[str, Samples]]:
-    """All grasps as samples: the objects' names, and split → samples in scene order."""
-    parts: dict[str, list[Samples]] = {}
-    names: dict[str, int] = {}
-    shards = listed_shards(grasps)
-    for shard in progress(shards, len(shards), "shards: reading grasps", "shard"):
-        with open_artifact(shard) as artifact:
-            for origin, found in read_grasps(artifact):
-                parts.setdefault(origin.split, []).append(as_samples(origin, found, names))
-    return tuple(names), {split: join_samples(every) for split, every in parts.items()}
+def scatter(stage: StageContext, plan: ShufflePlan, workers: int) -> tuple[str, ...]:
+    """Send the grasps to their parts, but those that are shards already; the objects' names."""
+    key = stage.key.digest
+    folder = scattered(stage)
+    for other in folder.parent.glob("*"):
+        if other != folder:
+            shutil.rmtree(other)  # of an interrupted shuffle of other grasps
+    folder.mkdir(parents=True, exist_ok=True)
+    shards = [shard for part in plan.parts for shard in part.shards]
+    named = next((shard for shard in shards if is_current(shard, key)), None)
+    todo = [part for part in plan.parts if not all(is_current(s, key) for s in part.shards)]
+    files = {part.number: files_of(stage, part) for part in todo}
+    jobs = [
+        ScatterJob(
+            sources,
+            {part: of_group[at] for part, of_group in files.items() if at in of_group},
+            stage.config,
+            stage.provenance(),
+        )
+        for at, sources in enumerate(plan.groups)
+    ]
+    missing = [job for job in jobs if not all(is_current(p, key) for p in job.files.values())]
+    grasps_bytes = sum(s.path.stat().st_size for job in missing for s in job.sources)
+    at_once = min(1.0, workers / len(plan.parts)) if stage.executor == "local" else 1.0
+    require_room(folder, int(grasps_bytes * (1 + at_once)), "Shuffling")
+    done = run_in_order(scatter_group, jobs, workers, stage.executor)
+    found = list(progress(done, len(jobs), "shards: reading grasps", "group"))
+    # Whatever one shard names, all do: names are known before the first is written.
+    return object_names_in(named) if named else tuple(dict.fromkeys(n for f in found for n in f))
 
 
-def as_samples(origin: GraspOrigin, grasps: LabelledGrasps, names: dict[str, int]) -> Samples:
-    """The part of a batch that training reads; new objects are added to ``names``."""
-    index = np.array([names.setdefault(name, len(names)) for name in origin.object_names])
-    count = len(grasps)
-    shape_class = list(type(level_of(origin.level)[0])).index(level_of(origin.level)[0])
-    return Samples(
-        cloud=grasps.cloud,
-        cloud_mask=grasps.cloud_mask,
-        quality=grasps.quality.astype(np.float32),
-        object_index=index[grasps.object_index],
-        shape_class=np.full(count, shape_class),
-        level=np.full(count, origin.level),
-        pressure=grasps.pressure.astype(np.float32),
-        proposal_weight=proposal_weights(grasps.proposal, grasps.keep_probability),
-        pictures=grasps.pictures,
-    )
+def scattered(stage: StageContext) -> Path:
+    """Folder of the first pass's files, for as long as the stage is not finished."""
+    return stage.folder.state(stage.name) / stage.key.digest[:16]
 
 
-def write_split(
-    stage: StageContext, split: str, samples: Samples, names: tuple[str, ...]
-) -> list[ShardEntry]:
-    """The shards of one split; those already there are kept."""
-    config = stage.config.shards
-    count = -(-len(samples) // config.samples_per_shard)
-    folder = stage.shards / split
-    entries = []
-    for index in progress(range(count), count, f"shards: writing {split}", "shard"):
-        first = index * config.samples_per_shard
-        part = samples.take(slice(first, first + config.samples_per_shard))
-        path = shard_path(folder, index, count)
-        if not is_current(path, stage.key.digest):
-            write_shard(stage, path, part, names, first)
-        entries.append(shard_entry(path, stage.output.parent, len(part), split))
-    return entries
+def files_of(stage: StageContext, part: Part) -> dict[int, Path]:
+    """Group → the file in which it sends samples to a part, where it sends any."""
+    folder = scattered(stage) / f"{part.number:05d}"
+    return {at: folder / f"{at:05d}.mcap" for at, count in enumerate(part.counts) if count}
 
 
-def write_shard(
-    stage: StageContext, path: Path, samples: Samples, names: tuple[str, ...], first: int
-) -> None:
-    """One shard: some hundreds of samples a message, log time is the sample's index."""
-    config = stage.config.shards
-    with ArtifactWriter(path, stage.provenance(), config.compression) as artifact:
-        write_samples(artifact, samples, names, config.samples_per_message, first)
-
-
-def summary(
-    entries: list[ShardEntry], by_split: dict[str, Samples], names: tuple[str, ...]
-) -> Summary:
+def summary(parts: Sequence[Part], gathered: Sequence[Gathered], names: Sequence[str]) -> Summary:
     """The stage's headline figures."""
+    of = {
+        split: [g for p, g in zip(parts, gathered, strict=True) if p.split == split]
+        for split in SPLITS
+    }
+    quality = {split: np.sum([g.quality for g in found], axis=0) for split, found in of.items()}
+    seen = {
+        split: sum(g.seen for g in found) / sum(g.cells for g in found)
+        for split, found in of.items()
+    }
     return {
-        "samples": {split: len(samples) for split, samples in by_split.items()},
-        "shards": dict(Counter(entry.split for entry in entries)),
+        "samples": {split: int(counts.sum()) for split, counts in quality.items()},
+        "shards": {split: sum(len(g.entries) for g in found) for split, found in of.items()},
         "objects": len(names),
-        "quality_histogram": {
-            split: quality_histogram(samples.quality.astype(np.float64)).tolist()
-            for split, samples in by_split.items()
-        },
-        "seen_cells": {
-            split: round(float(samples.cloud_mask.mean()), 4) for split, samples in by_split.items()
-        },
+        "quality_histogram": {split: counts.tolist() for split, counts in quality.items()},
+        "seen_cells": {split: round(share, 4) for split, share in seen.items()},
     }
 
 

@@ -46,6 +46,13 @@ class ShardsConfig(Section):
 
     samples_per_shard: int = Field(8192, ge=16, description="samples in one file")
     samples_per_message: int = Field(256, ge=1, le=8192, description="samples in one message")
+    samples_per_part: int = Field(
+        65536,
+        ge=16,
+        le=2**20,
+        description="about as many samples are shuffled in memory at once, 4 KB each; more are "
+        "shuffled in two passes over the disk",
+    )
     compression: Literal["zstd", "lz4", "none"] = "zstd"
 
 

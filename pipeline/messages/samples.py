@@ -1,8 +1,11 @@
 """Training samples ↔ softgrip.v1.SampleBatch and CloudBatch."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from pipeline.artifacts.reading import Artifact, open_artifact
 from pipeline.artifacts.sharding import listed_shards
@@ -72,6 +75,35 @@ def read_samples(artifact: Artifact) -> Iterator[Samples]:
     """The samples of a shard of any version, message by message."""
     for message, batch in with_clouds(artifact, SampleBatch):
         yield samples_of(message, batch)
+
+
+def read_numbered(artifact: Artifact, number_of: Mapping[str, int]) -> Iterator[Samples]:
+    """The samples of a shard, with objects numbered as the caller numbers them.
+
+    Parameters
+    ----------
+    artifact
+        The shard.
+    number_of
+        Name of an object → its number; of all objects of the shard.
+
+    Yields
+    ------
+    Samples
+        The samples, message by message.
+    """
+    for message, batch in with_clouds(artifact, SampleBatch):
+        samples = samples_of(message, batch)
+        number = np.array([number_of[name] for name in message.object_names])
+        yield replace(samples, object_index=number[samples.object_index])
+
+
+def object_names_in(path: Path) -> tuple[str, ...]:
+    """The names that ``object_index`` of a shard's samples points into."""
+    with open_artifact(path) as artifact:
+        for _, message in artifact.messages(SampleBatch):
+            return tuple(message.object_names)
+    return ()
 
 
 def sample_batch(samples: Samples, object_names: tuple[str, ...]) -> SampleBatch:

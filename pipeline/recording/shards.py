@@ -1,20 +1,28 @@
 """shards.rrd: how the dataset is balanced, and a walk through its clouds by growing quality."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from pipeline.labelling.balancing import quality_histogram
-from pipeline.messages.samples import read_split
-from pipeline.network.samples import SPLITS, Samples
+from pipeline.artifacts.reading import open_artifact
+from pipeline.artifacts.sharding import listed_shards
+from pipeline.clutter.levels import LEVELS
+from pipeline.geometry.shape import ShapeClass
+from pipeline.labelling.balancing import TENTHS, quality_histogram
+from pipeline.messages.samples import read_samples, samples_of
+from pipeline.network.samples import SPLITS, Samples, join_samples
 from pipeline.recording import colours
 from pipeline.recording.recording import FinishedStage, eye_at, recording, time_panel
 from pipeline.spread import choose_evenly
+from schemas.softgrip.v1.samples_pb2 import SampleBatch
 
 TIMELINE = "sample"
+# Clouds are chosen of so many samples: shuffled, they stand for all, and they fit in memory.
+SHOWN_OF = 16384
 SHEET_COLUMNS = 10  # clouds in a row of the sheet
 SHEET_SPACING = 3.0  # in r_G: clouds are 2.4 wide
 CELL_RADIUS = 0.04  # a cell is drawn as a ball of this size, in r_G
@@ -22,9 +30,26 @@ CELL_RADIUS = 0.04  # a cell is drawn as a ball of this size, in r_G
 
 def draw_shards(stage: FinishedStage, figures: Mapping[str, Any]) -> None:
     """Draw the recording from the finished shards."""
-    by_split = {split: read_split(stage.output, split) for split in SPLITS}
     with recording(stage, blueprint()) as stream:
-        show_samples(stream, by_split, stage.config.recording.clouds)
+        show_balance(stream, stage.output)
+        wanted = stage.config.recording.clouds
+        show_clouds(stream, first_samples(stage.output, "train", max(SHOWN_OF, wanted)), wanted)
+
+
+def first_samples(index: Path, split: str, wanted: int) -> Samples:
+    """The first samples of a split, as many messages as hold the wanted number, or all."""
+    found: list[Samples] = []
+    for samples in _batches(index, split):
+        found.append(samples)
+        if sum(map(len, found)) >= wanted:
+            break
+    return join_samples(found)
+
+
+def _batches(index: Path, split: str) -> Iterator[Samples]:
+    for shard in listed_shards(index, [split]):
+        with open_artifact(shard) as artifact:
+            yield from read_samples(artifact)
 
 
 def blueprint() -> rrb.Blueprint:
@@ -63,17 +88,22 @@ def blueprint() -> rrb.Blueprint:
     )
 
 
-def show_samples(stream: rr.RecordingStream, by_split: dict[str, Samples], wanted: int) -> None:
-    """Bars of the whole dataset, and ``wanted`` training clouds from the worst to the best."""
-    for split, samples in by_split.items():
-        histogram = quality_histogram(samples.quality.astype(np.float64))
-        stream.log(f"curves/quality/{split}", rr.BarChart(histogram), static=True)
-    levels = np.concatenate([samples.level for samples in by_split.values()]).astype(np.int64)
-    classes = np.concatenate([s.shape_class for s in by_split.values()]).astype(np.int64)
-    by_level = np.bincount(levels, minlength=10)[1:]
-    stream.log("curves/level", rr.BarChart(by_level), static=True)
-    stream.log("curves/class", rr.BarChart(np.bincount(classes, minlength=3)), static=True)
-    show_clouds(stream, by_split["train"], wanted)
+def show_balance(stream: rr.RecordingStream, index: Path) -> None:
+    """Bars of the whole dataset, counted message by message without clouds."""
+    by_level = np.zeros(LEVELS.stop, dtype=np.int64)
+    by_class = np.zeros(len(ShapeClass), dtype=np.int64)
+    for split in SPLITS:
+        by_tenth = np.zeros(TENTHS, dtype=np.int64)
+        for shard in listed_shards(index, [split]):
+            with open_artifact(shard) as artifact:
+                for _, message in artifact.messages(SampleBatch):
+                    rows = samples_of(message)
+                    by_tenth += quality_histogram(rows.quality.astype(np.float64))
+                    by_level += np.bincount(rows.level, minlength=len(by_level))
+                    by_class += np.bincount(rows.shape_class, minlength=len(by_class))
+        stream.log(f"curves/quality/{split}", rr.BarChart(by_tenth), static=True)
+    stream.log("curves/level", rr.BarChart(by_level[1:]), static=True)
+    stream.log("curves/class", rr.BarChart(by_class), static=True)
 
 
 def show_clouds(stream: rr.RecordingStream, samples: Samples, wanted: int) -> None:
