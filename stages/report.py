@@ -19,12 +19,14 @@ from pipeline.reporting.failures import failures_of
 from pipeline.reporting.figures import figures_of, overall_rates, proposed_tables
 from pipeline.reporting.lineage import lineage_of, lineage_svg
 from pipeline.reporting.page import html_page, markdown_page
+from pipeline.reporting.seals import seals_figure, seals_of
 from pipeline.reporting.tables import table_pages
 from pipeline.reporting.words import describe_meshes, headline, mixed_parts
 from stages.graph import MADE, RUNS_DIR
 
 GOALS = {"evaluate": "eval"}  # what `make` calls a stage, where it is another word
 FAILURES = 8  # as many as a page has room for
+SEALS_EACH = 3  # of seals that held, and of those that did not
 LINEAGE = "lineage"
 FIGURES = "report"  # folder of the pictures, beside the page
 
@@ -63,6 +65,8 @@ def make_report(folder: RunFolder) -> Path:
     failures, pictures = (
         failures_of(folder, config, next(iter(success)), FAILURES) if success else ([], {})
     )
+    if success and (seals := seals_of(folder, config, next(iter(success)), SEALS_EACH)):
+        figures["seals"] = seals_figure(seals, config)
     provenance = read_origins([folder.artifact(name) for name in names])
     meshes, licence, licence_text = describe_meshes(folder, config, catalogue)
     title = config.dataset.title or f"softgrip, run {run}"

@@ -107,6 +107,11 @@ class HandConfig(ScaledSection):
     touch_n: float = Field(
         2.0, ge=0, description="what the pad's spring pushes with when it touches [N]"
     )
+    measures_vacuum: bool = Field(
+        True,
+        description="whether a sensor tells the vacuum at the pad, by which objects too light for "
+        "the wrench are felt",
+    )
     camera_radius_m: float = Field(
         0.031,
         gt=0,

@@ -2,7 +2,8 @@
 
 A figure is a standard deviation where its description does not say otherwise. What belongs to a
 calibration is drawn once a clutter and held; noise is drawn anew for every reading. Every figure is
-multiplied by `scale`.
+multiplied by `scale`. What is said to be «as remembered» was written down from memory of a data
+sheet and not held against it: look it up for your arm.
 """
 
 import math
@@ -25,28 +26,43 @@ class ImperfectionConfig(Section):
         4.0,
         ge=0,
         description="offset of each force at the base before the wrench is tared: two sigma are "
-        "KUKA's 2 % of the 320 N m of iiwa 14's second joint, at 0.8 m [N]",
+        "2 % of the 320 N m of iiwa 14's second joint, at 0.8 m; KUKA's 2 % as remembered [N]",
     )
     moment_bias_nm: float = Field(
         0.4,
         ge=0,
         description="the same of each moment: two sigma are 2 % of the 40 N m of the last two "
-        "joints [N m]",
+        "joints; KUKA's 2 % as remembered [N m]",
     )
     force_tare_n: float = Field(
         0.15,
         ge=0,
-        description="what taring leaves of it: repeatability that the data sheet of another arm "
-        "with seven torque sensors gives, Franka Research 3 [N]",
+        description="what taring leaves of it: repeatability of another arm with seven torque "
+        "sensors, Franka Research 3's data sheet as remembered [N]",
     )
     moment_tare_nm: float = Field(
-        0.05, ge=0, description="the same of each moment; Franka Research 3 [N m]"
+        0.05,
+        ge=0,
+        description="the same of each moment; Franka Research 3's data sheet as remembered [N m]",
     )
     force_noise_n: float = Field(
-        0.035, ge=0, description="noise of each force in a reading; Franka Research 3, RMS [N]"
+        0.035,
+        ge=0,
+        description="noise of each force in a reading, RMS; Franka Research 3's data sheet as "
+        "remembered [N]",
     )
     moment_noise_nm: float = Field(
-        0.005, ge=0, description="noise of each moment in a reading; Franka Research 3, RMS [N m]"
+        0.005,
+        ge=0,
+        description="noise of each moment in a reading, RMS; Franka Research 3's data sheet as "
+        "remembered [N m]",
+    )
+    vacuum_noise: float = Field(
+        0.005,
+        ge=0,
+        le=1,
+        description="noise of the vacuum, the mean of a control period, over the pump's greatest: "
+        "estimate, 0.25 % of a sensor of 25 kPa that is zeroed in free air, at a fan of 12 kPa [1]",
     )
     hand_eye_m: float = Field(
         0.001,
@@ -113,6 +129,11 @@ class ImperfectionConfig(Section):
     def force_error_n(self) -> float:
         """Standard deviation of one force that a tared wrench tells [N]."""
         return self.scale * math.hypot(self.force_tare_n, self.force_noise_n)
+
+    @property
+    def vacuum_error(self) -> float:
+        """Standard deviation of one vacuum that is read, over the pump's greatest [1]."""
+        return self.scale * self.vacuum_noise
 
     @property
     def moment_error_nm(self) -> float:

@@ -115,6 +115,16 @@ class PolicyConfig(ScaledSection):
     trim_from_m: ClassVar[LengthInMetres] = LengthInMetres()
 
     candidates: int = Field(128, ge=1, le=4096, description="u, sub clouds of the global phase")
+    more_candidates: int = Field(
+        384,
+        ge=0,
+        le=4096,
+        description="drawn besides where none of these promises enough_quality: the good places of "
+        "a hard scene are small, or steep",
+    )
+    enough_quality: float = Field(
+        0.5, ge=0, le=1, description="q-hat from which a first choice is good enough [1]"
+    )
     local_candidates: int = Field(48, ge=1, le=4096, description="u of each step on the way down")
     wrist_views: int = Field(
         2,
@@ -127,6 +137,13 @@ class PolicyConfig(ScaledSection):
     )
     tilt_max_rad: float = Field(
         math.radians(50), ge=0, lt=math.pi / 2, description="approach off the vertical [rad]"
+    )
+    steepest_rad: float = Field(
+        math.radians(75),
+        ge=0,
+        lt=math.pi / 2,
+        description="the same of more_candidates, and of what counts as liftable: a gripper 8 r_G "
+        "long then still stands over the table [rad]",
     )
     rate_hz: float = Field(15.0, gt=0, description="closed-loop rate; Supplement VI: 15 [Hz]")
     approach_max_s: float = Field(
@@ -199,6 +216,22 @@ class PolicyConfig(ScaledSection):
     tension_sigmas: float = Field(
         1.0, ge=0, description="a pull is at least so many spreads of a force that is read [1]"
     )
+    vacuum_min: float = Field(
+        0.01,
+        gt=0,
+        le=1,
+        description="least vacuum over the pump's greatest that tells a held object, where the "
+        "vacuum is measured [1]",
+    )
+    vacuum_sigmas: float = Field(
+        3.0, ge=0, description="and it is at least so many spreads of a vacuum that is read [1]"
+    )
+    loss_readings: int = Field(
+        2, ge=1, description="readings in a row that show no object before it counts as lost"
+    )
+    trim_sigmas: float = Field(
+        2.0, ge=0, description="a moment that the lift tilts for is at least so many spreads [1]"
+    )
     slip_rg: float = Field(
         0.32, gt=0, description="shift of the load's line in one step that is a slip [r_G]"
     )
@@ -255,6 +288,12 @@ class PolicyConfig(ScaledSection):
     )
     trim_moment_nm: float = Field(0.005, ge=0, description="less is not worth a tilt [N m]")
     motion: MotionConfig = MotionConfig()
+
+    @model_validator(mode="after")
+    def _steepest_is_steeper(self) -> Self:
+        if self.steepest_rad < self.tilt_max_rad:
+            raise ValueError("steepest_rad must not be less than tilt_max_rad")
+        return self
 
     @model_validator(mode="after")
     def _approach_has_a_way(self) -> Self:

@@ -43,6 +43,8 @@ def correct_aim(
     world_from_contact, shape (4, 4), and its q-hat; None where no candidate is left.
     """
     policy = config.policy
+    # A steep aim is corrected among steep contacts.
+    is_steep = aim[2, 2] < np.cos(policy.tilt_max_rad)
     cloud = merged_cloud([picture], policy.correction_voxel_m, policy.above_table_m)
     near = sample_near(
         cloud,
@@ -50,7 +52,7 @@ def correct_aim(
         policy.correction_radius_m,
         policy.local_candidates,
         normal_radius_m,
-        policy.tilt_max_rad,
+        policy.steepest_rad if is_steep else policy.tilt_max_rad,
         rng,
     )
     free = free_of_collision(near.world_from_contact, cloud.points_m, config.hand)

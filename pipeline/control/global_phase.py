@@ -22,6 +22,7 @@ from pipeline.control.viewpoints import (
     back_off,
     choose_apart,
     gripper_above,
+    turn_camera_up,
     turn_half_about_approach,
     turn_least,
 )
@@ -120,9 +121,7 @@ class GlobalPhase:
         if len(cloud) == 0 and len(unseen) == 0:
             return Cause.EMPTY_CLOUD
         decision.pictures = pictures
-        found = self._without_failed(self._sample(cloud))
-        quality = self._ranking(pictures, found) if len(found) else np.empty(0)
-        self._robot.think()
+        found, quality = self._rated(cloud, pictures)
         decision.candidates, decision.quality = found.world_from_contact, quality
         self._ranked = [
             *self._rank_free(cloud, found, quality, best_first=quality),
@@ -144,6 +143,12 @@ class GlobalPhase:
         if choice is None:
             self._rejected_m.pop()
         return choice
+
+    def turned(self, contact: Pose) -> Pose:
+        """A contact turned about its approach: the wrist turns little, its camera stays up."""
+        hand = self._config.hand
+        least = turn_least(contact, self._robot.pose())
+        return turn_camera_up(least, hand.camera_aside_m, hand.camera_above_m)
 
     def reject(self, places_m: Sequence[Float[np.ndarray, " 3"]]) -> None:
         """Exclude the surroundings of these contacts, in WCS [m], for the rest of the attempt."""
@@ -186,6 +191,23 @@ class GlobalPhase:
         )
         return self._first_of(ranked, least=0.0)
 
+    def _rated(
+        self, cloud: Cloud, pictures: Sequence[DepthPicture]
+    ) -> tuple[Candidates, Float[np.ndarray, " k"]]:
+        """Candidates and their q-hat; more of them where none promises enough."""
+        found = self._without_failed(self._sample(cloud))
+        quality = self._ranking(pictures, found) if len(found) else np.empty(0)
+        self._robot.think()
+        more = self._policy.more_candidates
+        if more == 0 or quality.max(initial=0.0) >= self._policy.enough_quality:
+            return found, quality
+        # All are rated again: each is averaged with its neighbours, and now it has some.
+        steepest = self._policy.steepest_rad
+        found = found.joined(self._without_failed(self._sample(cloud, more, steepest)))
+        quality = self._ranking(pictures, found) if len(found) else np.empty(0)
+        self._robot.think()
+        return found, quality
+
     def _look_closer(
         self, pictures: Sequence[DepthPicture], travel: Travel
     ) -> list[DepthPicture] | Cause:
@@ -226,7 +248,7 @@ class GlobalPhase:
             distance = [np.linalg.norm(place - aim) for aim in self._rejected_m]
             if min(distance, default=np.inf) < self._policy.another_m:
                 continue
-            if self._can_reach(turn_least(choice.world_from_contact, self._robot.pose())):
+            if self._can_reach(self.turned(choice.world_from_contact)):
                 return choice
         return None
 
@@ -259,12 +281,12 @@ class GlobalPhase:
     def _unseen_contacts(self, pictures: Sequence[DepthPicture]) -> list[Pose]:
         return unseen_contacts(pictures, self._policy.unseen, self._policy.above_table_m)
 
-    def _sample(self, cloud: Cloud) -> Candidates:
+    def _sample(self, cloud: Cloud, count: int = 0, tilt_max_rad: float = 0.0) -> Candidates:
         return sample_candidates(
             cloud,
-            self._policy.candidates,
+            count or self._policy.candidates,
             self._normal_radius_m,
-            self._policy.tilt_max_rad,
+            tilt_max_rad or self._policy.tilt_max_rad,
             self._rng,
         )
 

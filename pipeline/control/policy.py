@@ -26,7 +26,7 @@ from pipeline.control.global_phase import Choice, GlobalPhase
 from pipeline.control.local_phase import LocalPhase, way_left_m
 from pipeline.control.regrasp import load_place_m
 from pipeline.control.robot import Eyes, Reading, Robot, State
-from pipeline.control.viewpoints import back_off, turn_least
+from pipeline.control.viewpoints import back_off
 from pipeline.control.wrench_monitor import Event, WrenchMonitor, hanging_n, trim_pose
 
 Phase = tuple[State, Callable[[], Cause | None]]
@@ -70,13 +70,14 @@ class Attempt:
         self._strategy = strategy
         self._config = config
         self._policy = config.policy
-        self._monitor = WrenchMonitor(config.policy, config.imperfection.force_error_n)
+        robots = config.imperfection
+        self._monitor = WrenchMonitor(config.policy, robots.force_error_n, robots.vacuum_error)
         self._global = GlobalPhase(eyes, robot, strategy, config, normal_radius_m, rng, avoid_m)
         self._local = LocalPhase(strategy.ranking, config, normal_radius_m, rng)
         self._new_choices_left = config.policy.new_choices
         self._retargets_left = config.policy.retargets if strategy.corrects else 0
         self._regrasps_left = config.policy.regrasps if strategy.seals_again else 0
-        self._moment_error_nm = config.imperfection.moment_error_nm
+        self._moment_error_nm = robots.moment_error_nm
         self._aim_unmeasured = False
         self.decision = Decision()
 
@@ -246,7 +247,7 @@ class Attempt:
 
     def _aim_nearer(self, felt: Reading) -> bool:
         """Aim at a contact nearer to the object's centre of mass; whether there was one."""
-        if not (self._strategy.feels and self._monitor.holds(felt)):
+        if not (self._strategy.feels and self._monitor.pulls(felt)):
             return False
         place = load_place_m(felt, self._config.hand.length_m)
         lever_m = float(np.linalg.norm(place - felt.world_from_gripper[:2, 3]))
@@ -269,14 +270,13 @@ class Attempt:
         height_m = self._policy.lift_share * self._config.lift.height_m
         speed_m_s = self._policy.speed_m_s
         left = self._policy.trim_max_rad if self._strategy.feels else 0.0
+        sure_nm = self._policy.trim_sigmas * self._moment_error_nm
         reading = None
         while True:
             target = self._robot.pose()
             risen = target[2, 3] - start[2, 3]
             if reading is not None and left > 0 and risen >= self._policy.trim_from_m:
-                target, turned = trim_pose(
-                    target, reading.wrench, left, self._policy, self._moment_error_nm
-                )
+                target, turned = trim_pose(target, reading.wrench, left, self._policy, sure_nm)
                 left -= turned
             target[:2, 3], target[2, 3] = start[:2, 3], start[2, 3] + height_m
             reading = self._robot.step(target, speed_m_s)
@@ -328,6 +328,6 @@ class Attempt:
         return True
 
     def _aim(self, pose: Float[np.ndarray, "4 4"], quality: float, by: list[DepthPicture]) -> None:
-        self.decision.world_from_contact = turn_least(pose, self._robot.pose())
+        self.decision.world_from_contact = self._global.turned(pose)
         self.decision.predicted_quality = float(quality)
         self.decision.aimed_by = by

@@ -85,6 +85,28 @@ def turn_least(
     return pose
 
 
+def turn_camera_up(
+    world_from_gripper: Float[np.ndarray, "4 4"], aside_m: float, above_m: float
+) -> Float[np.ndarray, "4 4"]:
+    """The pose, turned by half a turn about its approach where the camera is lower than the pad.
+
+    Parameters
+    ----------
+    world_from_gripper
+        The pose, shape (4, 4).
+    aside_m
+        How far the camera is off the gripper's axis, along x [m].
+    above_m
+        How far it is above the pad, along z [m].
+
+    Returns
+    -------
+    world_from_gripper, shape (4, 4).
+    """
+    rises_m = aside_m * world_from_gripper[2, 0] + above_m * world_from_gripper[2, 2]
+    return turn_half_about_approach(world_from_gripper) if rises_m < 0.0 else world_from_gripper
+
+
 def back_off(
     world_from_contact: Float[np.ndarray, "4 4"], distance_m: float
 ) -> Float[np.ndarray, "4 4"]:

@@ -1,10 +1,12 @@
-"""Events that the wrench at the gripper's base shows: contact, collision, seal, slip, loss.
+"""Events that wrench and vacuum show: contact, collision, seal, slip, loss.
 
 Supplement VI: the force-torque wrench is «mainly utilized to monitor the grasp status, like
 collision and grasp success, optimize the robotic motion, and minimize the moments on the gripper
-base during grasping».
+base during grasping». A wrench from joint torques does not tell an object of some grams from none;
+where a sensor tells the vacuum at the pad, that decides.
 """
 
+import math
 from enum import StrEnum
 
 import numpy as np
@@ -29,7 +31,9 @@ class Event(StrEnum):
 class WrenchMonitor:
     """Watches the readings of one attempt."""
 
-    def __init__(self, config: PolicyConfig, error_n: float = 0.0) -> None:
+    def __init__(
+        self, config: PolicyConfig, error_n: float = 0.0, vacuum_error: float = 0.0
+    ) -> None:
         """Nothing was read yet.
 
         Parameters
@@ -39,11 +43,16 @@ class WrenchMonitor:
         error_n
             Standard deviation of a force that is read, by the robot's data sheet [N]; less than so
             many of it, as the configuration says, tells nothing.
+        vacuum_error
+            The same of the vacuum that is read, over the pump's greatest.
         """
         self._config = config
         self._contact_n = max(config.contact_n, config.contact_sigmas * error_n)
         self._tension_n = max(config.tension_min_n, config.tension_sigmas * error_n)
+        self._sure_n = max(config.tension_min_n, config.contact_sigmas * error_n)
+        self._vacuum = max(config.vacuum_min, config.vacuum_sigmas * vacuum_error)
         self._line: Float[np.ndarray, " 3"] | None = None
+        self._missed = 0
 
     def moving(self, reading: Reading) -> Event:
         """The event of a reading in free space or during the approach."""
@@ -56,13 +65,27 @@ class WrenchMonitor:
         return Event.NOTHING
 
     def holds(self, reading: Reading) -> bool:
-        """Whether an object hangs on the gripper: its pull shows the seal (grasp success)."""
+        """Whether an object is held (grasp success): the vacuum shows it, or its pull.
+
+        Without a sensor of the vacuum, a pull that is likely an object's is enough. With one, an
+        open pad tells that nothing is held, unless the pull is sure: what leaks much may be heavy.
+        """
+        if math.isnan(reading.pressure):
+            return self.pulls(reading)
+        return reading.pressure >= self._vacuum or hanging_n(reading) >= self._sure_n
+
+    def pulls(self, reading: Reading) -> bool:
+        """Whether the wrench alone tells an object: where its load hangs can be told then."""
         return hanging_n(reading) >= self._tension_n
 
     def carrying(self, reading: Reading) -> Event:
         """The event of a reading while an object is held: lost, or slipped under the pad."""
         if not self.holds(reading):
-            return Event.LOSS
+            self._missed += 1
+            return Event.LOSS if self._missed >= self._config.loss_readings else Event.NOTHING
+        self._missed = 0
+        if not self.pulls(reading):
+            return Event.NOTHING  # too light to tell where it hangs
         before, self._line = self._line, line_of_load(reading.wrench)
         if before is not None and np.linalg.norm(self._line - before) > self._config.slip_m:
             return Event.SLIP

@@ -67,21 +67,21 @@ def nsvr_scale(nsvr: Mapping[str, float], shape_class: Mapping[str, str]) -> str
         for (kind, colour), marker in zip(SHAPE_CLASS.items(), MARKERS, strict=False):
             own = [name for name in ordered if shape_class[name] == kind]
             x, y = [place[name] for name in own], [nsvr[name] for name in own]
-            axes.plot(x, y, marker, color=_rgb(colour), label=f"{kind} ({len(own)})", ms=5)
+            axes.plot(x, y, marker, color=rgb(colour), label=f"{kind} ({len(own)})", ms=5)
         for threshold in (TYPICAL_FROM, COMPLEX_FROM):
             axes.axhline(threshold, color="0.3", lw=0.8, ls="--")
             axes.annotate(f"{threshold}", (0.2, threshold), va="bottom", color="0.3")
         axes.set(xlabel="objects by growing NSVR", ylabel="NSVR [1]")
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.legend()
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def label_histogram(by_split: Mapping[str, Sequence[int]]) -> str:
     """Labels by tenth of q, a bar a split."""
     hatches = ("", "///", "xxx")
     styles = [
-        {"color": _rgb(SPLIT[split]), "hatch": hatches[number % len(hatches)]}
+        {"color": rgb(SPLIT[split]), "hatch": hatches[number % len(hatches)]}
         for number, split in enumerate(by_split)
     ]
     return _bars_by_tenth(by_split, by_split.values(), styles, "grasps")
@@ -90,7 +90,7 @@ def label_histogram(by_split: Mapping[str, Sequence[int]]) -> str:
 def compared_histograms(by_run: Mapping[str, Sequence[int]]) -> str:
     """Labels of several runs by tenth of q, as shares, a bar a run."""
     shares = [np.array(counts) / max(sum(counts), 1) for counts in by_run.values()]
-    styles = [{"color": _rgb(PALETTE[number % len(PALETTE)])} for number in range(len(by_run))]
+    styles = [{"color": rgb(PALETTE[number % len(PALETTE)])} for number in range(len(by_run))]
     return _bars_by_tenth(by_run, shares, styles, "share of grasps")
 
 
@@ -111,7 +111,7 @@ def _bars_by_tenth(
         axes.set_xticks(range(11), [f"{tenth / 10:.1f}" for tenth in range(11)])
         axes.set(xlabel="grasp quality q [1]", ylabel=ylabel)
         axes.legend()
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def training_curve(
@@ -121,15 +121,15 @@ def training_curve(
     with mpl.rc_context(STYLE):
         figure, (axes,) = _axes(1, 2.6)
         epochs = np.arange(len(train)) + 1
-        axes.plot(epochs, train, "o-", color=_rgb(PALETTE[4]), label="train", ms=3)
-        axes.plot(epochs, val, "s--", color=_rgb(PALETTE[5]), label="val", ms=3)
+        axes.plot(epochs, train, "o-", color=rgb(PALETTE[4]), label="train", ms=3)
+        axes.plot(epochs, val, "s--", color=rgb(PALETTE[5]), label="val", ms=3)
         axes.axhline(mean_predictor, color="0.4", ls=":", label="mean predictor, on test")
         axes.axvline(best_epoch + 1, color="0.6", lw=0.8, label=f"best epoch: {best_epoch + 1}")
         axes.set(xlabel="epoch", ylabel="mean |q̂ − q| [1]")
         axes.set_ylim(bottom=0)
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
         axes.legend(ncols=2)
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def calibration(predicted: Sequence[float], true: Sequence[float], count: Sequence[int]) -> str:
@@ -138,12 +138,12 @@ def calibration(predicted: Sequence[float], true: Sequence[float], count: Sequen
         figure, (axes,) = _axes(1, 3.0, width=3.4)
         axes.plot([0, 1], [0, 1], color="0.6", lw=0.8, ls="--", label="perfect")
         size = 10 + 90 * np.asarray(count) / max(*count, 1)
-        axes.plot(predicted, true, color=_rgb(PALETTE[4]), lw=1)
-        axes.scatter(predicted, true, s=size, color=_rgb(PALETTE[4]), zorder=3, label="test")
+        axes.plot(predicted, true, color=rgb(PALETTE[4]), lw=1)
+        axes.scatter(predicted, true, s=size, color=rgb(PALETTE[4]), zorder=3, label="test")
         axes.set(xlabel="mean predicted q̂ [1]", ylabel="mean true q [1]", xlim=(0, 1), ylim=(0, 1))
         axes.set_aspect("equal")
         axes.legend(loc="upper left")
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def lifted_by_quality(by_ranking: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
@@ -170,7 +170,7 @@ def lifted_by_quality(by_ranking: Mapping[str, Sequence[Mapping[str, Any]]]) -> 
                 x,
                 share,
                 yerr=np.clip([share - low, high - share], 0, None),
-                color=_rgb(PALETTE[4 + number]),
+                color=rgb(PALETTE[4 + number]),
                 marker=MARKERS[number],
                 ls=DASHES[number],
                 capsize=2,
@@ -183,7 +183,7 @@ def lifted_by_quality(by_ranking: Mapping[str, Sequence[Mapping[str, Any]]]) -> 
         axes.set(xlabel="mean predicted q̂ [1]", ylabel="share lifted [1]", xlim=(0, 1))
         axes.set_ylim(-0.02, 1.08)
         axes.legend(loc="upper left")
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def fig_1(members: Sequence[TrainedMember], mean_predictor: float) -> str:
@@ -195,7 +195,7 @@ def fig_1(members: Sequence[TrainedMember], mean_predictor: float) -> str:
             line: dict[str, Any] = {
                 "marker": MARKERS[number % len(MARKERS)],
                 "ls": DASHES[number % len(DASHES)],
-                "color": _rgb(PALETTE[(4, 5, 2, 6, 0, 1)[number % 6]]),
+                "color": rgb(PALETTE[(4, 5, 2, 6, 0, 1)[number % 6]]),
                 "label": "-".join(map(str, channels)),
                 "ms": 4,
             }
@@ -219,7 +219,7 @@ def fig_1(members: Sequence[TrainedMember], mean_predictor: float) -> str:
         times.set(xlabel="layers", ylabel="time a grasp [ms]", xticks=depths)
         times.set_ylim(bottom=0)
         figure.legend(*errors.get_legend_handles_labels(), loc="outside lower center", ncols=3)
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def success_by_level(rates: Mapping[str, Mapping[int, Rate]]) -> str:
@@ -237,7 +237,7 @@ def success_by_level(rates: Mapping[str, Mapping[int, Rate]]) -> str:
                 100 * y,
                 yerr=100 * np.maximum([y - low, high - y], 0),
                 fmt=MARKERS[number % len(MARKERS)],
-                color=_rgb(PALETTE[(4, 5, 2, 6, 0, 1)[number % 6]]),
+                color=rgb(PALETTE[(4, 5, 2, 6, 0, 1)[number % 6]]),
                 capsize=2,
                 ms=5,
                 label=policy or "closed loop",
@@ -248,7 +248,7 @@ def success_by_level(rates: Mapping[str, Mapping[int, Rate]]) -> str:
         axes.set(xlabel="clutter level of Table II", ylabel="lifted [% of attempts]")
         axes.set_ylim(0, 103)
         axes.legend(ncols=3, loc="lower left")
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def success_by_errors(rates: Mapping[str, Mapping[float, Rate]]) -> str:
@@ -264,7 +264,7 @@ def success_by_errors(rates: Mapping[str, Mapping[float, Rate]]) -> str:
                 100 * y,
                 yerr=100 * np.maximum([y - low, high - y], 0),
                 marker=MARKERS[number % len(MARKERS)],
-                color=_rgb(PALETTE[(4, 5, 2, 6, 0, 1)[number % 6]]),
+                color=rgb(PALETTE[(4, 5, 2, 6, 0, 1)[number % 6]]),
                 capsize=2,
                 ms=5,
                 label=policy,
@@ -274,7 +274,7 @@ def success_by_errors(rates: Mapping[str, Mapping[float, Rate]]) -> str:
         axes.set(xlabel="errors of the robot, times as published [1]")
         axes.set(ylabel="lifted [% of attempts]", ylim=(0, 103))
         axes.legend(loc="lower left")
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def load_by_quality(by_tenth: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
@@ -291,12 +291,12 @@ def load_by_quality(by_tenth: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
                 fmt="o-",
                 ms=4,
                 capsize=2,
-                color=_rgb(colour),
+                color=rgb(colour),
             )
             axes.set(xlabel=f"{name} [1]", xlim=(0, 1))
             axes.set_ylim(bottom=0)
         panels[0].set_ylabel("weight borne [N], quartiles")
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def worst_contacts(by_object: Mapping[str, Sequence[WorstContact]]) -> str:
@@ -314,7 +314,7 @@ def worst_contacts(by_object: Mapping[str, Sequence[WorstContact]]) -> str:
                 title = f"q {one.quality:.2f}, q-hat {one.predicted:.2f}"
                 line[2 * number].set_title(f"{name}\n{title}" if number == 0 else f"\n{title}")
                 line[2 * number + 1].set_title(f"\nq-hat {one.predicted_without_noise:.2f}")
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def _heights(axes: Axes, cloud: Float[np.ndarray, "g g 3"]) -> None:
@@ -326,12 +326,12 @@ def wall_times(seconds: Mapping[str, float]) -> str:
     with mpl.rc_context(STYLE):
         figure, (axes,) = _axes(1, 0.6 + 0.28 * len(seconds))
         names = list(seconds)[::-1]
-        bars = axes.barh(names, [seconds[name] for name in names], color=_rgb(PALETTE[1]))
+        bars = axes.barh(names, [seconds[name] for name in names], color=rgb(PALETTE[1]))
         axes.bar_label(bars, [f"{seconds[name]:.1f} s" for name in names], padding=3)
         axes.set(xlabel="wall time [s]")
         axes.margins(x=0.15)
         axes.grid(visible=False, axis="y")
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def _axes(columns: int, height_in: float, width: float = WIDTH_IN) -> tuple[Figure, list[Axes]]:
@@ -339,11 +339,13 @@ def _axes(columns: int, height_in: float, width: float = WIDTH_IN) -> tuple[Figu
     return figure, list(figure.subplots(1, columns, squeeze=False)[0])
 
 
-def _rgb(colour: np.ndarray) -> tuple[float, ...]:
+def rgb(colour: np.ndarray) -> tuple[float, ...]:
+    """A colour of bytes as Matplotlib takes it, in [0, 1]."""
     return tuple(float(part) / 255 for part in colour)
 
 
-def _svg(figure: Figure) -> str:
+def svg_text(figure: Figure) -> str:
+    """The figure as SVG, the same bytes for the same figure."""
     text = io.StringIO()
     figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
     return text.getvalue()

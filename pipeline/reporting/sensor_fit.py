@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from pipeline.recording.colours import PALETTE
 from pipeline.reporting.page import cell
-from pipeline.reporting.plots import DASHES, MARKERS, STYLE, WIDTH_IN, _rgb, _svg
+from pipeline.reporting.plots import DASHES, MARKERS, STYLE, WIDTH_IN, rgb, svg_text
 from pipeline.sensing.depth_noise import NoiseModel
 
 ANGLES_DEG = (0, 20, 40, 60, 80)  # bounds of the groups that the figure shows
@@ -39,7 +39,7 @@ def spread_figure(bins: Float[np.ndarray, "n 4"], model: NoiseModel) -> str:
             own = bins[(angle >= low) & (angle < high)]
             if len(own) == 0:
                 continue
-            colour = _rgb(PALETTE[(4, 5, 2, 6)[number]])
+            colour = rgb(PALETTE[(4, 5, 2, 6)[number]])
             axes.scatter(
                 own[:, 0],
                 1e3 * own[:, 2],
@@ -54,7 +54,7 @@ def spread_figure(bins: Float[np.ndarray, "n 4"], model: NoiseModel) -> str:
         axes.set(xlabel="depth [m]", ylabel="spread off a plane [mm]")
         axes.set_yscale("log")
         axes.legend(title="incidence", ncols=2)
-        return _svg(figure)
+        return svg_text(figure)
 
 
 def sensor_page(figures: Mapping[str, Any], picture: str) -> str:

@@ -1,9 +1,9 @@
 """The ceiling: what the best of many poses bears of an object, as it lies, on its true surface.
 
 No policy can lift what no pose holds. Poses are drawn over the object's surface, from all sides
-that the robot reaches without its stem meeting a body. The label says cheaply which of them may
-bear most; the judge says what the best of these, and where none of them lifts the object poses near
-the best, do bear through a whole attempt.
+that the robot reaches without its stem meeting a body, and no steeper than the policy may try. The
+label says cheaply which of them may bear most; the judge says what the best of these, and where
+none of them lifts the object poses near the best, do bear through a whole attempt.
 """
 
 from collections.abc import Callable, Mapping
@@ -195,6 +195,7 @@ class Ceilings:
         touching = some.world_from_contact.copy()
         touching[:, :3, 3] += np.where(np.isfinite(top_m), top_m, 0.0)[:, None] * touching[:, :3, 2]
         free = np.isfinite(top_m) & free_of_collision(touching, obstacles_m, evaluate.hand)
+        free &= touching[:, 2, 2] >= np.cos(evaluate.policy.steepest_rad)
         standoff_m = evaluate.policy.standoff_m
         able = [
             row

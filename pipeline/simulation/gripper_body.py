@@ -422,7 +422,8 @@ class SuctionGripper:
         self._sample(wrench)
         followed, self._follows = self._follows, True
         peak_n = float(np.linalg.norm(peak if error is None else peak + error[:3]))
-        return Reading(self.pose(), wrench, peak_n, arrived, followed, self._pressure())
+        pressure = self.samples[-1].pressure
+        return Reading(self.pose(), wrench, peak_n, arrived, followed, pressure)
 
     def _error(self) -> Float[np.ndarray, " 6"] | None:
         """What the wrench that is read next differs by from the truth; None: not at all."""
@@ -459,8 +460,14 @@ class SuctionGripper:
         )
 
     def _pressure(self) -> float:
-        """What a pressure sensor would read, over the pump's greatest vacuum: 0 once it leaks."""
-        return self.seal_pressure if self._joint is not None else 0.0
+        """What the vacuum's sensor reads, over the pump's greatest; NaN without one.
+
+        The pull of the seal stands for it; 0 where nothing is held.
+        """
+        if not self._config.evaluate.hand.measures_vacuum:
+            return math.nan
+        true = self.seal_pressure if self._joint is not None else 0.0
+        return true if self._sensor is None else true + self._sensor.vacuum_error()
 
     def _reach_m(self) -> float:
         """Height above the contact at which rays start [m]."""

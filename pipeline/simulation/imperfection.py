@@ -76,7 +76,7 @@ def with_imperfection(config: RunConfig, scale: float) -> RunConfig:
 
 
 class WrenchSensor:
-    """Reads a wrench with an offset and noise."""
+    """Reads a wrench with an offset and noise, and a vacuum with noise."""
 
     def __init__(
         self,
@@ -99,6 +99,7 @@ class WrenchSensor:
         self._noise = config.scale * _spreads(config.force_noise_n, config.moment_noise_nm)
         self._offset = bias
         self._rng = rng
+        self._vacuum = config.scale * config.vacuum_noise
 
     def tare(self) -> None:
         """Set the present reading, without a load, to zero; a new and smaller offset is left."""
@@ -107,6 +108,10 @@ class WrenchSensor:
     def error(self) -> Float[np.ndarray, " 6"]:
         """What one reading differs from the truth by: force [N] and moment [N m], shape (6,)."""
         return self._offset + self._noise * self._rng.standard_normal(6)
+
+    def vacuum_error(self) -> float:
+        """What one vacuum that is read differs from the truth by, over the pump's greatest."""
+        return self._vacuum * float(self._rng.standard_normal())
 
 
 def _spreads(force_n: float, moment_nm: float) -> Float[np.ndarray, " 6"]:

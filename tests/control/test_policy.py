@@ -221,6 +221,34 @@ def test_a_place_that_looks_bad_from_near_is_left_for_another() -> None:
     assert decision.world_from_contact[0, 3] > 0.15
 
 
+@pytest.mark.parametrize(("promised", "drawn"), [(0.9, 1), (0.1, 4)])
+def test_more_candidates_are_drawn_only_where_none_promises_enough(
+    promised: float, drawn: int
+) -> None:
+    def promises(_: Sequence[DepthPicture], candidates: Candidates) -> np.ndarray:
+        return np.full(len(candidates), promised)
+
+    decision, _ = tried(plate(), FakeRobot(TOP_M), replace(OPEN, ranking=promises))
+    assert len(decision.candidates) == drawn * CONFIG.policy.candidates
+
+
+@pytest.mark.parametrize(("level_promises", "aims_steep"), [(0.6, False), (0.1, True)])
+def test_a_steep_place_is_tried_only_where_no_other_promises_enough(
+    level_promises: float, aims_steep: bool
+) -> None:
+    slope = np.radians(-65)  # it faces the camera over the level plate
+    steep = plate(0.0) @ np.array(
+        [[np.cos(slope), 0, -np.sin(slope)], [0, 1, 0], [np.sin(slope), 0, np.cos(slope)]]
+    )
+    points = np.concatenate([plate(), steep + np.array([0.25, 0.0, TOP_M])])
+
+    def promises(_: Sequence[DepthPicture], candidates: Candidates) -> np.ndarray:
+        return np.where(candidates.world_from_contact[:, 2, 2] < 0.5, 0.9, level_promises)
+
+    decision, _ = tried(points, FakeRobot(TOP_M), replace(OPEN, ranking=promises))
+    assert (decision.world_from_contact[2, 2] < 0.5) == aims_steep
+
+
 def heavy(lever_m: float) -> HeavyRobot:
     return HeavyRobot(TOP_M, np.array([-0.01, 0.0, 0.02]), lever_m, CONFIG.hand.length_m)
 

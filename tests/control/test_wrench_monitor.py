@@ -1,5 +1,7 @@
 """The wrench monitor on wrenches of closed form."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -11,9 +13,15 @@ CONFIG = PolicyConfig()
 WEIGHT = np.array([0.0, 0.0, -2.0])
 
 
-def reading(force: np.ndarray, at_m: np.ndarray | None = None, peak_n: float = 0.0) -> Reading:
+def reading(
+    force: np.ndarray,
+    at_m: np.ndarray | None = None,
+    peak_n: float = 0.0,
+    pressure: float = math.nan,
+) -> Reading:
     moment = np.zeros(3) if at_m is None else np.cross(at_m, force)
-    return Reading(np.eye(4), np.concatenate([force, moment]), peak_n, arrived=False)
+    wrench = np.concatenate([force, moment])
+    return Reading(np.eye(4), wrench, peak_n, arrived=False, pressure=pressure)
 
 
 def test_a_push_on_the_pad_is_contact_and_a_blow_is_a_collision() -> None:
@@ -30,7 +38,16 @@ def test_a_pull_is_a_seal_and_its_end_is_a_loss() -> None:
     assert not monitor.holds(reading(-WEIGHT))
     assert monitor.holds(reading(WEIGHT))
     assert monitor.carrying(reading(WEIGHT)) is Event.NOTHING
+    for _ in range(CONFIG.loss_readings - 1):
+        assert monitor.carrying(reading(np.zeros(3))) is Event.NOTHING
     assert monitor.carrying(reading(np.zeros(3))) is Event.LOSS
+
+
+def test_one_reading_that_misses_an_object_is_no_loss() -> None:
+    monitor = WrenchMonitor(CONFIG)
+    for _ in range(5):
+        assert monitor.carrying(reading(WEIGHT)) is Event.NOTHING
+        assert monitor.carrying(reading(np.zeros(3))) is Event.NOTHING
 
 
 def test_less_than_the_robot_can_tell_apart_is_no_touch_and_no_pull() -> None:
@@ -42,6 +59,37 @@ def test_less_than_the_robot_can_tell_apart_is_no_touch_and_no_pull() -> None:
     light = np.array([0.0, 0.0, -0.9 * CONFIG.tension_sigmas * error_n])
     assert sharp.holds(reading(light))
     assert not monitor.holds(reading(light))
+
+
+def test_an_object_too_light_for_the_wrench_is_felt_by_the_vacuum() -> None:
+    error_n, vacuum_error = 0.15, 0.02
+    monitor = WrenchMonitor(CONFIG, error_n, vacuum_error)
+    light = np.array([0.0, 0.0, -0.1 * error_n])
+    sealed = 1.1 * CONFIG.vacuum_sigmas * vacuum_error
+    assert monitor.holds(reading(light, pressure=sealed))
+    assert monitor.carrying(reading(light, pressure=sealed)) is Event.NOTHING
+    assert not monitor.pulls(reading(light, pressure=sealed))
+    assert not monitor.holds(reading(light, pressure=0.8 * sealed))
+    events = [monitor.carrying(reading(light, pressure=0.0)) for _ in range(CONFIG.loss_readings)]
+    assert events[-1] is Event.LOSS
+
+
+def test_a_pad_that_leaks_holds_what_surely_pulls() -> None:
+    error_n = 0.15
+    monitor = WrenchMonitor(CONFIG, error_n, vacuum_error=0.02)
+    likely = np.array([0.0, 0.0, -1.1 * CONFIG.tension_sigmas * error_n])
+    sure = np.array([0.0, 0.0, -1.1 * CONFIG.contact_sigmas * error_n])
+    assert monitor.holds(reading(likely))  # without a sensor, nothing else tells
+    assert not monitor.holds(reading(likely, pressure=0.0))
+    assert monitor.holds(reading(sure, pressure=0.0))
+
+
+def test_where_a_light_load_hangs_is_not_told_by_noise() -> None:
+    monitor = WrenchMonitor(CONFIG, error_n=0.15, vacuum_error=0.02)
+    light, below = np.array([0.0, 0.0, -0.02]), np.array([0.0, 0.0, -0.25])
+    assert monitor.carrying(reading(light, below, pressure=0.5)) is Event.NOTHING
+    jumped = below + np.array([5 * CONFIG.slip_m, 0, 0])
+    assert monitor.carrying(reading(light, jumped, pressure=0.5)) is Event.NOTHING
 
 
 def test_a_load_that_jumps_aside_has_slipped() -> None:

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial.transform import Rotation
 
 from pipeline.config import RunConfig
 from pipeline.config.evaluation import CeilingConfig, EvaluateConfig
+from pipeline.config.policy import PolicyConfig
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.gripper.pad import build_pad
 from pipeline.labelling.sampling import Candidates
@@ -32,9 +34,11 @@ def heavy(tmp_path_factory: pytest.TempPathFactory) -> CatalogueObject:
     return catalogue_object("bar", BAR, tmp_path_factory.mktemp("parts"), 20_000.0)
 
 
-def ceilings(*items: CatalogueObject, reachable: bool = True) -> Ceilings:
+def ceilings(
+    *items: CatalogueObject, reachable: bool = True, config: RunConfig = CONFIG
+) -> Ceilings:
     numbered = dict(enumerate(items, start=1))
-    return Ceilings(numbered, PAD, JUDGE, lambda _: reachable, CONFIG, seed=7)
+    return Ceilings(numbered, PAD, JUDGE, lambda _: reachable, config, seed=7)
 
 
 def found(looked: Ceilings, *poses: np.ndarray) -> dict[int, Best]:
@@ -71,6 +75,18 @@ def test_what_is_too_heavy_for_a_full_seal_cannot_be_lifted(heavy: CatalogueObje
 def test_out_of_reach_nothing_is_borne(bar: CatalogueObject) -> None:
     best = found(ceilings(bar, reachable=False), LIES)[1]
     assert (best.borne_n, best.reached, best.lifts) == (0.0, 0, False)
+
+
+def test_no_pose_is_steeper_than_the_policy_may_try(bar: CatalogueObject) -> None:
+    most = np.radians(30)
+    policy = PolicyConfig(tilt_max_rad=most, steepest_rad=most)
+    evaluate = CONFIG.evaluate.model_copy(update={"policy": policy})
+    config = CONFIG.model_copy(update={"evaluate": evaluate})
+    leans = pose_at(0, 0, 0.05)
+    leans[:3, :3] = Rotation.from_euler("x", 45, degrees=True).as_matrix()
+    best = found(ceilings(bar, config=config), leans)[1]
+    assert best.reached > 0
+    assert best.world_from_gripper[2, 2] >= np.cos(most)
 
 
 def test_under_a_lid_nothing_is_borne(bar: CatalogueObject) -> None:

@@ -71,3 +71,12 @@ def test_noise_is_drawn_anew_for_every_reading() -> None:
     np.testing.assert_allclose(
         errors.std(axis=0), np.repeat([ONE.force_noise_n, ONE.moment_noise_nm], 3), rtol=0.15
     )
+
+
+def test_a_vacuum_is_read_with_the_noise_of_its_sensor() -> None:
+    for scale in (0.0, 1.0, 2.0):
+        config = ImperfectionConfig(scale=scale)
+        sensor = WrenchSensor(config, np.zeros(6), np.random.default_rng(0))
+        errors = [sensor.vacuum_error() for _ in SEEDS]
+        assert np.std(errors) == pytest.approx(scale * ONE.vacuum_noise, rel=0.15)
+        assert config.vacuum_error == scale * ONE.vacuum_noise
