@@ -110,7 +110,9 @@ def build(stage: StageContext) -> Summary:
         )
         for index, portions in enumerate(config.grasps.of_scenes(count))
     ]
-    done = run_in_order(synthesize_shard, jobs, stage.workers, stage.executor)
+    done = run_in_order(
+        synthesize_shard, jobs, stage.workers, stage.executor, limit_s=stage.item_limit_s
+    )
     results = list(progress(done, count, "grasps", "scene"))
     quality = np.concatenate([result.quality for result in results])
     stage.drawing.seconds += sum(result.recording_s for result in results)

@@ -5,6 +5,7 @@ Results arrive in the order of the items, so what is written never depends on
 the number of workers.
 """
 
+import math
 import multiprocessing
 import signal
 import threading
@@ -35,6 +36,7 @@ def run_in_order(
     workers: int,
     executor: Executor = "local",
     ahead_per_worker: int = AHEAD_PER_WORKER,
+    limit_s: float = math.inf,
 ) -> Iterator[Result]:
     """Compute ``job(item)`` for every item, in worker processes or on a Ray cluster.
 
@@ -54,6 +56,9 @@ def run_in_order(
     ahead_per_worker
         Results of each worker that may wait for their turn; many where results are small and items
         take unequal time.
+    limit_s
+        How long an item may be waited for once all before it are done [s]; work in this process
+        has no limit.
 
     Yields
     ------
@@ -63,12 +68,12 @@ def run_in_order(
     Raises
     ------
     SoftgripError
-        A worker process died (killed, or out of memory).
+        A worker process died (killed, or out of memory), or an item took longer than allowed.
     """
     if executor == "ray":
         from pipeline.execution.ray_executor import run_on_ray  # an optional package
 
-        yield from run_on_ray(job, items)
+        yield from run_on_ray(job, items, limit_s=limit_s)
         return
     if workers <= 1:
         yield from map(job, items)
@@ -80,12 +85,14 @@ def run_in_order(
         for item in items:
             waiting.append(_submit(pool, job, item))
             if len(waiting) >= workers * ahead_per_worker:
-                yield waiting.popleft().result()
+                yield waiting.popleft().result(_seconds(limit_s))
         while waiting:
-            yield waiting.popleft().result()
+            yield waiting.popleft().result(_seconds(limit_s))
+    except TimeoutError as error:
+        _kill_workers()
+        raise too_long(limit_s) from error
     except BrokenProcessPool as error:
-        for process in multiprocessing.active_children():  # one just started would wait for ever
-            process.kill()
+        _kill_workers()  # one just started would wait for ever
         raise SoftgripError(
             "A worker process died: it was killed or the machine ran out of memory",
             "Run the same command again, it goes on where it stopped; "
@@ -93,6 +100,25 @@ def run_in_order(
         ) from error
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
+
+
+def too_long(limit_s: float) -> SoftgripError:
+    """The error of an item that took longer than allowed."""
+    return SoftgripError(
+        f"A work item took longer than {limit_s:g} s: its worker hangs",
+        "Run the same command again, it goes on where it stopped; where items need so long, "
+        "set ITEM_LIMIT_S to more seconds",
+    )
+
+
+def _seconds(limit_s: float) -> float | None:
+    """As `concurrent.futures` and Ray want it: None for no limit."""
+    return None if math.isinf(limit_s) else limit_s
+
+
+def _kill_workers() -> None:
+    for process in multiprocessing.active_children():
+        process.kill()
 
 
 def _submit(pool: ProcessPoolExecutor, job: Callable[[Item], Result], item: Item) -> Future[Result]:

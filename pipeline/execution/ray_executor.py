@@ -7,6 +7,7 @@ that Ray ends because its node runs out of memory, as often.
 
 import importlib
 import io
+import math
 import os
 import pickle
 import sys
@@ -19,6 +20,7 @@ from types import ModuleType
 from typing import Any, TypeVar
 
 from pipeline.errors import MachineError, SoftgripError
+from pipeline.execution.executors import too_long
 from pipeline.execution.ray_cluster import MOST_RETRIES, connected
 
 Item = TypeVar("Item")
@@ -56,6 +58,7 @@ def run_on_ray(
     job: Callable[[Item], Result],
     items: Iterable[Item],
     lost: Callable[[str], Result] | None = None,
+    limit_s: float = math.inf,
 ) -> Iterator[Result]:
     """Compute ``job(item)`` for every item on a Ray cluster, one CPU each.
 
@@ -69,6 +72,8 @@ def run_on_ray(
         Picklable values.
     lost
         Makes the result of an item that cost every worker its life, from what became of it.
+    limit_s
+        How long an item may be waited for once all before it are done [s].
 
     Yields
     ------
@@ -80,11 +85,12 @@ def run_on_ray(
     MachineError
         Ray is not installed, no cluster answers, or no node could find the job.
     SoftgripError
-        The worker of a job died more often than the job is tried again, and ``lost`` is not given.
+        The worker of a job died more often than the job is tried again, and ``lost`` is not given;
+        or an item took longer than allowed.
     """
     named = job_by_name(job)
     with connected() as ray:
-        yield from _in_order(ray, named, items, lost)
+        yield from _in_order(ray, named, items, lost, limit_s)
 
 
 def _in_order(
@@ -92,6 +98,7 @@ def _in_order(
     named: JobByName,
     items: Iterable[Item],
     lost: Callable[[str], Result] | None,
+    limit_s: float,
 ) -> Iterator[Result]:
     """Results in the order of the items, of a bounded number of items in flight."""
     remote = ray.remote(num_cpus=1, max_retries=MOST_RETRIES)(_run_there)
@@ -101,18 +108,22 @@ def _in_order(
     for item in items:
         waiting.append(remote.remote(pickle.dumps((named, item)), there, program))
         if len(waiting) >= ahead:
-            yield _result(waiting.popleft(), program, lost)
+            yield _result(waiting.popleft(), program, lost, limit_s)
     while waiting:
-        yield _result(waiting.popleft(), program, lost)
+        yield _result(waiting.popleft(), program, lost, limit_s)
 
 
-def _result(sent: Any, program: str, lost: Callable[[str], Any] | None) -> Any:
+def _result(sent: Any, program: str, lost: Callable[[str], Any] | None, limit_s: float) -> Any:
     """The result of an item, waited for; a worker's death after all retries is told or ``lost``."""
     import ray
-    from ray.exceptions import OutOfMemoryError, RayTaskError, WorkerCrashedError
+    from ray.exceptions import GetTimeoutError, OutOfMemoryError, RayTaskError, WorkerCrashedError
 
     try:
-        return unpickled(ray.get(sent), {program: "__main__"})
+        limit = None if math.isinf(limit_s) else limit_s
+        return unpickled(ray.get(sent, timeout=limit), {program: "__main__"})
+    except GetTimeoutError as error:
+        ray.cancel(sent, force=True)
+        raise too_long(limit_s) from error
     except RayTaskError as error:
         raise error.cause from error
     except (OutOfMemoryError, WorkerCrashedError) as error:

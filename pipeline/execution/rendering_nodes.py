@@ -4,6 +4,7 @@ Local processes: this one. On a Ray cluster: one process on every node that rend
 driver renders with, so that the bytes are the same. Other nodes are told and get no such item.
 """
 
+import math
 import pickle
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -16,7 +17,7 @@ from loguru import logger
 
 from pipeline.config.cameras import RendererName
 from pipeline.errors import SoftgripError
-from pipeline.execution.executors import Executor
+from pipeline.execution.executors import Executor, too_long
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -29,6 +30,7 @@ def run_on_rendering_nodes(
     items: Iterable[Item],
     executor: Executor,
     renderer: RendererName,
+    limit_s: float = math.inf,
 ) -> Iterator[Result]:
     """Compute ``job(item)`` for every item, where there is a renderer.
 
@@ -42,6 +44,9 @@ def run_on_rendering_nodes(
         Local processes, or a Ray cluster.
     renderer
         The renderer that the configuration asks for.
+    limit_s
+        How long an item may be waited for once all before it are done [s]; work in this process
+        has no limit.
 
     Yields
     ------
@@ -51,7 +56,7 @@ def run_on_rendering_nodes(
     Raises
     ------
     SoftgripError
-        Every node that could render is lost.
+        Every node that could render is lost, or an item took longer than allowed.
     """
     if executor == "local":
         yield from map(job, items)
@@ -74,7 +79,7 @@ def run_on_rendering_nodes(
             return
         processes = [_Process(node.name, _started(ray, node.node_id)) for node in able]
         try:
-            yield from _in_order(ray, named, items, processes)
+            yield from _in_order(ray, named, items, processes, limit_s)
         finally:
             for process in processes:
                 ray.kill(process.actor)
@@ -100,11 +105,16 @@ def _started(ray: ModuleType, node_id: str) -> Any:
 
 
 def _in_order(
-    ray: ModuleType, job: Any, items: Iterable[Any], processes: Sequence[_Process]
+    ray: ModuleType,
+    job: Any,
+    items: Iterable[Any],
+    processes: Sequence[_Process],
+    limit_s: float,
 ) -> Iterator[Any]:
     """Results in the order of the items; items of a process that is lost go to another."""
     from pipeline.execution.ray_executor import program_name, unpickled
 
+    limit = None if math.isinf(limit_s) else limit_s
     program, there, living = program_name(), str(Path.cwd()), list(processes)
     waiting: deque[tuple[bytes, _Process, Any]] = deque()
 
@@ -118,7 +128,9 @@ def _in_order(
             item, process, ref = waiting.popleft()
             process.holds -= 1
             try:
-                return unpickled(ray.get(ref), {program: "__main__"})
+                return unpickled(ray.get(ref, timeout=limit), {program: "__main__"})
+            except ray.exceptions.GetTimeoutError as error:
+                raise too_long(limit_s) from error
             except ray.exceptions.RayTaskError as error:
                 raise error.cause from error
             except ray.exceptions.RayActorError as error:

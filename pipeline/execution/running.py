@@ -76,6 +76,10 @@ def stage_command(
         executor: Annotated[
             Executor, typer.Option(envvar="EXECUTOR", help="local processes, or a Ray cluster")
         ] = "local",
+        item_limit_s: Annotated[
+            float,
+            typer.Option(envvar="ITEM_LIMIT_S", min=1, help="a worker that takes longer hangs [s]"),
+        ] = 3600.0,
         force: Annotated[bool, typer.Option(help="run even when nothing changed")] = False,
     ) -> None:
         folder = RunFolder(runs_dir / run)
@@ -83,7 +87,7 @@ def stage_command(
             # Of its own for each process: two would write one memo at once.
             memo = f"hashes.rank{rank}.json" if rank else MEMO
             context = stage_context(stage, folder, inputs_of, mesh_dir, workers, memo)
-            context = replace(context, executor=executor)
+            context = replace(context, executor=executor, item_limit_s=item_limit_s)
             if rank > 0:
                 if force or not artifact_is_fresh(context):
                     build(context)

@@ -1,5 +1,6 @@
 """A stage as data, the folder of its run, and the context that it runs in."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -130,6 +131,8 @@ class StageContext:
         Folder of meshes; None: the embedded objects.
     executor
         Whether work runs in local processes or on a Ray cluster.
+    item_limit_s
+        How long a work item may take in a worker before it is said to hang [s].
     drawing
         Processor time that the recording costs.
     expectations
@@ -146,6 +149,7 @@ class StageContext:
     workers: int
     mesh_dir: Path | None
     executor: Executor = "local"
+    item_limit_s: float = math.inf
     drawing: Stopwatch = field(default_factory=Stopwatch)  # what its recording costs
     expectations: str = ""
 

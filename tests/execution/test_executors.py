@@ -23,6 +23,11 @@ def kill_yourself(x: int) -> int:
     return x
 
 
+def never_end(x: int) -> int:
+    time.sleep(600)
+    return x
+
+
 def complain(x: int) -> int:
     raise SoftgripError(f"item {x} is bad", "Leave it out")
 
@@ -35,6 +40,12 @@ def test_order_is_that_of_the_items(workers: int) -> None:
 def test_a_killed_worker_is_a_sentence_not_a_hang() -> None:
     with pytest.raises(SoftgripError, match=r"worker process died.*WORKERS=1"):
         list(run_in_order(kill_yourself, range(4), 2))
+
+
+def test_a_worker_that_hangs_is_a_sentence() -> None:
+    with pytest.raises(SoftgripError, match=r"longer than 1 s: its worker hangs.*ITEM_LIMIT_S"):
+        list(run_in_order(never_end, range(2), 2, limit_s=1.0))
+    assert not multiprocessing.active_children()
 
 
 @pytest.mark.parametrize("pause_s", [0.0, 0.001, 0.003, 0.01, 0.03, 0.1])

@@ -1,12 +1,13 @@
 """What renders runs once on every node that renders like the driver, and survives a lost node."""
 
 import os
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from pipeline.errors import SceneError
+from pipeline.errors import SceneError, SoftgripError
 from pipeline.execution import ray_cluster
 from pipeline.execution.ray_cluster import (
     Found,
@@ -16,6 +17,7 @@ from pipeline.execution.ray_cluster import (
     what_is_here,
     what_is_lacking,
 )
+from pipeline.execution.ray_executor import run_on_ray
 from pipeline.execution.rendering_nodes import run_on_rendering_nodes
 
 cluster_utils = pytest.importorskip("ray.cluster_utils", reason="Ray is not installed")
@@ -107,6 +109,17 @@ def test_items_of_a_lost_process_go_to_another(tmp_path: Path) -> None:
 def test_what_an_item_raises_arrives_as_it_was_raised() -> None:
     with pytest.raises(SceneError, match="clutter 1 cannot be built"):
         list(run_on_rendering_nodes(refused, [1], "ray", "embree"))
+
+
+def never_end(item: int) -> int:
+    time.sleep(600)
+    return item
+
+
+@pytest.mark.usefixtures("cluster")
+def test_a_node_that_hangs_is_a_sentence() -> None:
+    with pytest.raises(SoftgripError, match=r"longer than 2 s: its worker hangs"):
+        list(run_on_ray(never_end, [1], limit_s=2.0))
 
 
 @pytest.mark.usefixtures("cluster")
