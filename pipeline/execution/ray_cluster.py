@@ -24,7 +24,7 @@ _MEMORY_RETRIES = "RAY_task_oom_retries"
 SHOWN_DIFFERENCES = 3  # of many files or packages, in one line
 NODE_ANSWERS_WITHIN_S = 180.0  # a renderer is tried there, and a first start compiles shaders
 
-_connections = 0
+_connections = 0  # how many in this process use the cluster now
 
 
 @dataclass(frozen=True)

@@ -159,6 +159,11 @@ class StageContext:
         return self.stage.name
 
     @property
+    def has_workers(self) -> bool:
+        """Whether work items run in other processes than this one."""
+        return self.executor != "local" or self.workers > 1
+
+    @property
     def recording_id(self) -> str:
         """Equal for equal results, so that equal runs open as the same recording."""
         return self.key.digest

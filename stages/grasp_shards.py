@@ -1,0 +1,130 @@
+"""The shards of stage grasps as work items: the grasps of one scene, labelled and written."""
+
+import time
+from collections import Counter
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+
+from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact
+from pipeline.artifacts.sharding import is_current
+from pipeline.config import RunConfig
+from pipeline.execution import generator
+from pipeline.labelling.scene import label_scene, scene_surfaces
+from pipeline.labelling.shown_pads import drape_some_again
+from pipeline.messages.grasps import (
+    PADS_TOPIC,
+    GraspMessage,
+    grasp_messages,
+    grasps_of,
+    pads_message,
+    read_grasps,
+    read_portion,
+    write_messages,
+)
+from pipeline.messages.objects import catalogue
+from pipeline.messages.scenes import read_scene
+from pipeline.stopwatch import Stopwatch
+from pipeline.world.raycasting import RayScene
+from pipeline.world.scene import ClutterScene
+
+
+@dataclass(frozen=True)
+class Portion:
+    """Grasps of one scene that are drawn and balanced by themselves."""
+
+    number: int
+    grasps: int
+    key: str
+    former: Path | None  # the shard that held it before
+
+
+@dataclass(frozen=True)
+class ShardJob:
+    """One work item: the grasps of one scene."""
+
+    scene_index: int
+    portions: tuple[Portion, ...]
+    pads: int  # of its grasps, shown in the recording
+    shard: Path
+    objects: Path
+    scenes: Path
+    config: RunConfig
+    provenance: Provenance
+
+
+@dataclass(frozen=True)
+class ShardResult:
+    """What the driver needs to know of a finished shard."""
+
+    shard: Path
+    split: str
+    quality: Float[np.ndarray, " n"]
+    object_names: tuple[str, ...]
+    status: dict[str, int]
+    taken_over: int = 0  # portions
+    recording_s: float = 0.0  # processor time of draping the pads that are shown
+    spent_s: float = 0.0  # processor time of all of it, where it was made
+
+
+def synthesize_shard(job: ShardJob) -> ShardResult:
+    """Make, or keep, the shard of one scene."""
+    if is_current(job.shard, job.provenance.key):
+        return examined(job.shard)
+    draping, world, began = Stopwatch(), LabelledWorld(job), time.process_time()
+    former = {p: read_portion(p.former, p.key) for p in job.portions if p.former}
+    portions = [former.get(portion) or world.labelled(portion) for portion in job.portions]
+    messages = [message for portion in portions for message in portion]
+    with ArtifactWriter(job.shard, job.provenance) as artifact:
+        written = write_messages(artifact, messages)
+        if job.pads:
+            with draping.running():
+                labelled = [grasps_of(rows)[1] for rows, _ in messages]
+                pads = drape_some_again(labelled, job.pads, world.surfaces, job.config)
+                artifact.write(PADS_TOPIC, pads_message(pads), log_time_ns=written)
+    found = examined(job.shard)
+    taken_over = sum(map(bool, former.values()))
+    spent_s = time.process_time() - began
+    return replace(found, taken_over=taken_over, recording_s=draping.seconds, spent_s=spent_s)
+
+
+@dataclass(frozen=True)
+class LabelledWorld:
+    """The scene of a shard, read when grasps are made on it and not before."""
+
+    job: ShardJob
+
+    @cached_property
+    def scene(self) -> ClutterScene:
+        """What its cameras saw, and where its objects lie."""
+        return read_scene(self.job.scenes, self.job.scene_index)
+
+    @cached_property
+    def surfaces(self) -> RayScene:
+        """Its true surfaces."""
+        meshes = {name: item.mesh for name, (item, _) in catalogue(self.job.objects).items()}
+        return scene_surfaces(self.scene, meshes, self.job.config.scenes.table_side_m)
+
+    def labelled(self, portion: Portion) -> list[GraspMessage]:
+        """Label a portion of its grasps; the first is drawn from the stream of the scene."""
+        config, stream = self.job.config, (portion.number,) if portion.number else ()
+        rng = generator(config.seed, "grasps", self.scene.scene_id, *stream)
+        batches = label_scene(self.scene, self.surfaces, config, portion.grasps, rng)
+        size, rounded = config.grasps.samples_per_message, config.sensing.rounded
+        return grasp_messages(batches, size, rounded, portion.key)
+
+
+def examined(shard: Path) -> ShardResult:
+    """What a finished shard holds, read back from the file itself."""
+    quality, names, split = [], set(), ""
+    status: Counter[str] = Counter()
+    with open_artifact(shard) as artifact:
+        for origin, grasps in read_grasps(artifact, clouds=False):
+            split = origin.split
+            quality.append(grasps.quality)
+            names |= {origin.object_names[i] for i in np.unique(grasps.object_index)}
+            status.update(origin.status_names[s] for s in grasps.status)
+    return ShardResult(shard, split, np.concatenate(quality), tuple(sorted(names)), dict(status))
