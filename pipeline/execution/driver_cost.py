@@ -1,4 +1,4 @@
-"""What the driver of a cluster spends itself, and the largest cluster that it keeps busy with it."""
+"""What the driver of a cluster spends itself, and how large a cluster it keeps busy with that."""
 
 NODE_CORES = 8  # of the nodes that are counted
 LEAST_S = 1e-3  # a driver is never free, whatever its clock finds
