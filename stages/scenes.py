@@ -57,7 +57,8 @@ def build(stage: StageContext) -> Summary:
         scenes, left_out = make_scenes(stage, jobs, kept, artifact, clock)
         now = known.with_clutters({one.scene_id: settled_by(one, keys) for one in scenes})
         publish_bytes(stage.folder.state(CLUTTERS_FILE), now.to_json().encode())
-    shutil.rmtree(stage.folder.state("scenes"), ignore_errors=True)  # none where all were kept
+    if (own := stage.folder.state("scenes")).is_dir():  # not where all were taken over
+        shutil.rmtree(own)
     taken_over = sum(path == stage.output for path, _ in kept.values())
     figures = {"taken_over": taken_over, "made": len(scenes) - taken_over, "left_out": left_out}
     figures |= {"items_basis": basis, "render_share": clock.share()}
@@ -117,14 +118,12 @@ def make_scenes(
 
 def kept_scenes(jobs: list[SceneJob], former: Path) -> dict[str, tuple[Path, int]]:
     """Where the scenes lie that need not be made: in files of their own, or the former artifact."""
-    numbers, kept = numbers_by_key(former), {}
-    for job in jobs:
-        key = scene_key(job.basis, job.scene_id, job.settled) if job.settled else ""
-        if is_current(job.path, job.provenance.key):
-            kept[job.scene_id] = (job.path, 0)
-        elif key in numbers:
-            kept[job.scene_id] = (former, numbers[key])
-    return kept
+    settled = {job.scene_id: job.settled for job in jobs if job.settled}
+    keys = {scene_id: scene_key(jobs[0].basis, scene_id, of) for scene_id, of in settled.items()}
+    numbers = numbers_by_key(former, set(keys.values()))
+    kept = {name: (former, numbers[key]) for name, key in keys.items() if key in numbers}
+    own = [job for job in jobs if is_current(job.path, job.provenance.key)]
+    return kept | {job.scene_id: (job.path, 0) for job in own}
 
 
 def rendered_scene(

@@ -7,7 +7,7 @@ a viewer shows the file as it is.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import cast, get_args
 
@@ -132,12 +132,28 @@ def read_keys(path: Path) -> list[str]:
         return [scene.key for _, scene in artifact.messages(scenes_pb2.Scene)]
 
 
-def numbers_by_key(path: Path) -> dict[str, int]:
-    """Key → number of each scene of an artifact; none where it is not there or cannot be read."""
+def numbers_by_key(path: Path, wanted: Collection[str]) -> dict[str, int]:
+    """Which scenes of an artifact can be taken over.
+
+    Parameters
+    ----------
+    path
+        The artifact, which may be missing.
+    wanted
+        Keys of scenes.
+
+    Returns
+    -------
+    Key → number of each that it holds; none where any byte of it is damaged.
+    """
     try:
-        return {key: number for number, key in enumerate(read_keys(path)) if key}
+        found = {key: n for n, key in enumerate(read_keys(path)) if key in wanted}
+        if found:
+            with open_artifact(path) as artifact:
+                artifact.check()
     except ArtifactError:
         return {}  # made anew, all of it
+    return found
 
 
 def read_placements(path: Path) -> dict[str, tuple[PlacedObject, ...]]:

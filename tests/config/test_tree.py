@@ -4,9 +4,11 @@ import math
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pydantic import ValidationError, model_validator
 
-from pipeline.config import GripperConfig, RunConfig, load_run_config, section_digest
+from pipeline.config import GraspsConfig, GripperConfig, RunConfig, load_run_config, section_digest
 from pipeline.config.section import Section
 from pipeline.errors import ConfigError
 from tests.refusals import assert_refused_cheaply
@@ -46,6 +48,7 @@ def test_table_one_is_the_default_pad() -> None:
         ("[gripper]\nfriction=-1", r"'gripper\.friction' = -1.*greater than 0"),
         ("[grasps]\ncount='many'", r"'grasps\.count' = 'many'.*integer"),
         ("[scenes]\nlevels=[0, 3]", r"levels go from 1 to 9"),
+        ("[grasps]\nportions=2", r"give per_scene"),
         ("[gripper]\nsolver='magic'", r"'gripper\.solver' = 'magic'"),
         ("seed = nan", r"'seed'"),
         ("[gripper", r"is not valid TOML"),
@@ -172,3 +175,15 @@ def test_a_digest_follows_what_is_derived_and_what_validators_make() -> None:
         return section_digest(run, ("gripper",))
 
     assert len({digest(disc) for disc in (_Disc, _BetterDisc, _RoundedDisc)}) == 3
+
+
+@given(st.integers(1, 10_000), st.integers(1, 60), st.integers(0, 500), st.integers(1, 9))
+def test_grasps_are_shared_out_or_are_a_scenes(
+    count: int, scenes: int, per_scene: int, portions: int
+) -> None:
+    shared = GraspsConfig(count=count).of_scenes(scenes)
+    assert sum(map(sum, shared)) == count
+    assert max(shared)[0] - min(shared)[0] <= 1
+    if per_scene:
+        own = GraspsConfig(count=count, per_scene=per_scene, portions=portions).of_scenes(scenes)
+        assert own == [[per_scene] * portions] * scenes

@@ -21,10 +21,14 @@ from pipeline.labelling.shown_pads import ShownPads
 from pipeline.messages.clouds import cloud_batch
 from pipeline.messages.grasps import (
     grasp_batch,
+    grasp_messages,
     grasps_of,
     pads_message,
     pads_of,
+    portions_by_key,
+    read_portion,
     write_grasps,
+    write_messages,
 )
 from pipeline.messages.samples import sample_batch, samples_of
 from pipeline.network.samples import Samples, join_samples
@@ -159,3 +163,19 @@ def test_only_whole_shards_of_this_key_are_current(tmp_path: Path, provenance: P
     assert not is_current(path, "another")
     path.write_bytes(path.read_bytes()[:-200])
     assert not is_current(path, provenance.key)
+
+
+def test_a_portion_is_read_from_the_shard_that_holds_it_and_from_no_damaged_one(
+    tmp_path: Path, provenance: Provenance
+) -> None:
+    batches = [(ORIGIN, some_grasps(5)), (ORIGIN, some_grasps(3))]
+    first, second = (grasp_messages(batches, 4, True, key) for key in ("one", "two"))
+    shard = tmp_path / "0.mcap"
+    with ArtifactWriter(shard, provenance) as artifact:
+        assert write_messages(artifact, [*first, *second]) == 16
+    (tmp_path / "1.mcap").write_bytes(shard.read_bytes()[:-50])
+    assert portions_by_key(tmp_path) == {"one": shard, "two": shard}
+    assert read_portion(shard, "two") == second
+    assert read_portion(shard, "three") == []
+    assert read_portion(tmp_path / "1.mcap", "one") == []
+    assert read_portion(tmp_path / "gone.mcap", "one") == []

@@ -159,7 +159,14 @@ def test_only_what_is_new_is_made(tmp_path: Path, splits: str, first: list[int])
     later = read_placements(run.folder.artifact("scenes"))
     placed = {one.object_name for scene in later.values() for one in scene}
     assert placed & {f"box_{box}" for box in new}
-    assert run.files() == run.files_made_at_once(tmp_path / "once")
+    files = run.files()
+    assert files == run.files_made_at_once(tmp_path / "once")
+    # Nothing is taken over from an artifact of which one byte is damaged: it is made anew.
+    damaged = bytearray(files["scenes.mcap"])
+    damaged[len(damaged) // 2] ^= 1
+    run.folder.artifact("scenes").write_bytes(damaged)
+    assert run.make(stages=2) == [(7, 0), (0, 5)]
+    assert run.files() == files
 
 
 def test_what_is_removed_takes_its_scenes_along_alone(tmp_path: Path, splits: str) -> None:
@@ -187,7 +194,7 @@ def test_in_whatever_order_meshes_come_the_bytes_are_the_same(
     tmp_path: Path, splits: str, first: list[int]
 ) -> None:
     ends = []
-    for seed in range(3):
+    for seed in range(2):
         run, new = Grown(tmp_path / str(seed), splits), sorted(set(BOXES) - set(first))
         run.add(*first)
         run.make(stages=2)
@@ -198,7 +205,7 @@ def test_in_whatever_order_meshes_come_the_bytes_are_the_same(
         run.clutters = 2
         run.make()
         ends.append(run.files())
-    assert ends[0] == ends[1] == ends[2] == run.files_made_at_once(tmp_path / "once")
+    assert ends[0] == ends[1] == run.files_made_at_once(tmp_path / "once")
 
 
 @pytest.mark.parametrize("seed", range(2))
