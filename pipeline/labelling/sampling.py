@@ -20,6 +20,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
 
 from pipeline.config.grasps import GraspsConfig
+from pipeline.labelling.neighbourhood import sums_within
 
 
 class Proposal(IntEnum):
@@ -253,22 +254,14 @@ def mean_normals(
     Unit vectors, shape (k, 3); the nearest point's normal where no point is within the radius or
     the normals cancel each other.
     """
-    tree = cKDTree(surface.points_m)
-    near = tree.query_ball_point(points_m, radius_m)
-    counts = np.array([len(indices) for indices in near], dtype=np.int64)
-    owner = np.repeat(np.arange(len(points_m)), counts)
-    flat = np.concatenate([np.asarray(i, dtype=np.int64) for i in near]) if len(near) else owner
-    sums = np.zeros((len(points_m), 3))
-    for axis in range(3):
-        sums[:, axis] = np.bincount(
-            owner, weights=surface.normals[flat, axis], minlength=len(points_m)
-        )
+    sums, counts = sums_within(surface.points_m, surface.normals, points_m, radius_m)
     lengths = _lengths(sums)
-    _, nearest = tree.query(points_m)
     lonely = lengths <= 1e-6 * np.maximum(counts, 1)
-    return np.where(
-        lonely[:, None], surface.normals[nearest], sums / np.where(lonely, 1.0, lengths)[:, None]
-    )
+    means = sums / np.where(lonely, 1.0, lengths)[:, None]
+    if lonely.any():
+        _, nearest = cKDTree(surface.points_m).query(points_m[lonely])
+        means[lonely] = surface.normals[nearest]
+    return np.asarray(means)
 
 
 def tilt_directions(
@@ -334,9 +327,17 @@ def tangents(
     """Two unit vectors that make a right-handed frame with each unit normal."""
     # The world axis with the greatest angle to the normal: its cross product is never zero.
     helper = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
-    across = np.cross(helper, normals)
+    across = _cross(helper, normals)
     across /= _lengths(across)[:, None]
-    return across, np.cross(normals, across)
+    return across, _cross(normals, across)
+
+
+def _cross(
+    one: Float[np.ndarray, "n 3"], other: Float[np.ndarray, "n 3"]
+) -> Float[np.ndarray, "n 3"]:
+    """As NumPy's cross product, in a third of its time on few vectors."""
+    (a, b, c), (x, y, z) = one.T, other.T
+    return np.stack([b * z - c * y, c * x - a * z, a * y - b * x], axis=1)
 
 
 def _lengths(vectors: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, " n"]:
