@@ -1,13 +1,16 @@
 """Tables as Arrow files in a run's state, each by the digest of the artifact that it was read from.
 
-An artifact is read once; from then on a question maps the file and touches only the columns that
-it names. While a stage is made anew its artifact, the index last of all, stays as it was, and so
-does the table: what is asked meanwhile is the last whole state. `make prune` frees the files.
+An artifact is read once, or not at all where its stage noted the rows as it wrote them; from then
+on a question maps the file and touches only the columns that it names. While a stage is made anew
+its artifact, the index last of all, stays as it was, and so does the table: what is asked meanwhile
+is the last whole state. `make prune` frees the files.
 """
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 import pyarrow as pa
@@ -46,20 +49,55 @@ def arrow_table(name: str, artifact: Path, cache: Path) -> pa.Table:
     ArtifactError
         The artifact is damaged, of another version, or its shards are being made anew.
     """
-    table = BY_NAME[name]
     cache.mkdir(parents=True, exist_ok=True)
     with FileLock(cache / f"{name}.lock"):
-        digest = content_digests({name: artifact}, cache / f"{name}.digest.json")[name]
-        described = repr((CACHE_VERSION, table)).encode()
-        version = hashlib.sha256(described).hexdigest()[:DIGITS]
-        path = cache / f"{name}-{digest[:DIGITS]}-{version}.arrow"
+        path = _file_of(name, artifact, cache)
         if not path.is_file():
             with published(path) as scratch:
-                write_rows(scratch, table, ROWS[name](artifact))
-            for older in cache.glob(f"{name}-*.arrow"):
-                if older != path:
-                    older.unlink()
+                write_rows(scratch, BY_NAME[name], ROWS[name](artifact))
+            _remove_former(name, path)
     return pa.ipc.open_file(pa.memory_map(str(path))).read_all()
+
+
+@contextmanager
+def rows_noted(name: str, artifact: Path, cache: Path) -> Iterator[Callable[[Part], None]]:
+    """Let a stage note the rows of a table while it writes them, so that no one reads them again.
+
+    Parameters
+    ----------
+    name
+        Of the table.
+    artifact
+        The artifact that will hold its rows; it is written when the block ends.
+    cache
+        Folder of the Arrow files.
+
+    Yields
+    ------
+    Callable[[Part], None]
+        Takes rows, in the order of the artifact.
+    """
+    cache.mkdir(parents=True, exist_ok=True)
+    with published(cache / f"{name}.noted") as scratch, RowsFile(scratch, BY_NAME[name]) as rows:
+        yield rows.add
+    with FileLock(cache / f"{name}.lock"):
+        path = _file_of(name, artifact, cache)
+        (cache / f"{name}.noted").rename(path)
+        _remove_former(name, path)
+
+
+def _file_of(name: str, artifact: Path, cache: Path) -> Path:
+    """The Arrow file of a table, by the artifact's content and the columns as they are now."""
+    digest = content_digests({name: artifact}, cache / f"{name}.digest.json")[name]
+    described = repr((CACHE_VERSION, BY_NAME[name])).encode()
+    version = hashlib.sha256(described).hexdigest()[:DIGITS]
+    return cache / f"{name}-{digest[:DIGITS]}-{version}.arrow"
+
+
+def _remove_former(name: str, path: Path) -> None:
+    for older in path.parent.glob(f"{name}-*.arrow"):
+        if older != path:
+            older.unlink()
 
 
 def write_rows(path: Path, table: Table, parts: Iterator[Part]) -> None:
@@ -79,29 +117,48 @@ def write_rows(path: Path, table: Table, parts: Iterator[Part]) -> None:
     ArtifactError
         A part has a column that the table lacks.
     """
-    columns = {column.name: GrowingColumn(column) for column in table.columns}
-    schema = arrow_schema(table)
-    # Vocabularies only grow, and what is new of them is written beside the batch that needs it.
-    options = pa.ipc.IpcWriteOptions(emit_dictionary_deltas=True)
-    with pa.OSFile(str(path), "wb") as file, pa.ipc.new_file(file, schema, options=options) as out:
-
-        def write_waiting() -> None:
-            arrays = [column.taken() for column in columns.values()]
-            out.write_batch(pa.record_batch(arrays, schema=schema))
-
-        waiting = 0
+    with RowsFile(path, table) as rows:
         for part in parts:
-            if strange := part.keys() - columns.keys():
-                raise ArtifactError(f"Table {table.name} has no {strange}", "Report this")
-            rows = max((len(values) for values in part.values()), default=0)
-            for name, column in columns.items():
-                column.add(part.get(name), rows)
-            waiting += rows
-            if waiting >= BATCH_ROWS:
-                write_waiting()
-                waiting = 0
-        if waiting:
-            write_waiting()
+            rows.add(part)
+
+
+class RowsFile:
+    """An Arrow file of a table that takes rows part by part; a context manager."""
+
+    def __init__(self, path: Path, table: Table) -> None:
+        self._table = table
+        self._schema = arrow_schema(table)
+        self._columns = {column.name: GrowingColumn(column) for column in table.columns}
+        self._waiting = 0
+        # Vocabularies only grow, and what is new of one is written beside the batch that needs it.
+        options = pa.ipc.IpcWriteOptions(emit_dictionary_deltas=True)
+        self._file = pa.OSFile(str(path), "wb")
+        self._writer = pa.ipc.new_file(self._file, self._schema, options=options)
+
+    def add(self, part: Part) -> None:
+        """Take some rows; ArtifactError where the table lacks a column of theirs."""
+        if strange := part.keys() - self._columns.keys():
+            raise ArtifactError(f"Table {self._table.name} has no {strange}", "Report this")
+        rows = max((len(values) for values in part.values()), default=0)
+        for name, column in self._columns.items():
+            column.add(part.get(name), rows)
+        self._waiting += rows
+        if self._waiting >= BATCH_ROWS:
+            self._write_waiting()
+
+    def _write_waiting(self) -> None:
+        arrays = [column.taken() for column in self._columns.values()]
+        self._writer.write_batch(pa.record_batch(arrays, schema=self._schema))
+        self._waiting = 0
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *failure: object) -> None:
+        if self._waiting and failure[0] is None:
+            self._write_waiting()
+        self._writer.close()
+        self._file.close()
 
 
 class GrowingColumn:

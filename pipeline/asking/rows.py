@@ -16,6 +16,7 @@ from pipeline.geometry.shape import ShapeClass
 from pipeline.labelling.grasps import GraspOrigin, LabelledGrasps
 from pipeline.messages.grasps import read_grasps
 from pipeline.messages.samples import samples_of
+from pipeline.network.samples import Samples
 from pipeline.read_only import read_only
 from schemas.softgrip.v1.evaluation_pb2 import Attempt
 from schemas.softgrip.v1.objects_pb2 import CatalogueObject, RefusedMesh
@@ -24,6 +25,7 @@ from schemas.softgrip.v1.scenes_pb2 import Scene
 from schemas.softgrip.v1.training_pb2 import Epoch
 
 NONE = -1  # a word that is not there
+CLASSES = tuple(str(shape_class) for shape_class in ShapeClass)
 
 
 @dataclass(frozen=True)
@@ -187,22 +189,25 @@ def grasp_part(origin: GraspOrigin, grasps: LabelledGrasps, first: int) -> Part:
 
 def sample_rows(path: Path) -> Iterator[Part]:
     """Rows of table samples, a message at a time."""
-    classes = tuple(str(shape_class) for shape_class in ShapeClass)
     for shard, split in whole_shards(path):
         with open_artifact(shard) as artifact:
             for first, message in artifact.messages(SampleBatch):
-                samples = samples_of(message)
-                yield {
-                    "split": one_word(split, len(samples)),
-                    "sample": first + np.arange(len(samples)),
-                    "object": Words(tuple(message.object_names), samples.object_index),
-                    "shape_class": Words(classes, samples.shape_class),
-                    "level": samples.level,
-                    "q": samples.quality,
-                    "p": samples.pressure,
-                    "proposal_weight": samples.proposal_weight,
-                    "pictures": samples.pictures,
-                }
+                yield sample_part(samples_of(message), tuple(message.object_names), split, first)
+
+
+def sample_part(samples: Samples, object_names: tuple[str, ...], split: str, first: int) -> Part:
+    """Rows of some samples, the first of which has number ``first`` in its split."""
+    return {
+        "split": one_word(split, len(samples)),
+        "sample": first + np.arange(len(samples)),
+        "object": Words(object_names, samples.object_index),
+        "shape_class": Words(CLASSES, samples.shape_class),
+        "level": samples.level,
+        "q": samples.quality,
+        "p": samples.pressure,
+        "proposal_weight": samples.proposal_weight,
+        "pictures": samples.pictures,
+    }
 
 
 def epoch_rows(path: Path) -> Iterator[Part]:
