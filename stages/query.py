@@ -1,6 +1,7 @@
 """Ask a run in SQL: `make query RUN=... SQL="..."`; the tables are told by schemas/TABLES.md."""
 
 import sys
+import time
 from pathlib import Path
 from typing import Annotated
 
@@ -10,8 +11,6 @@ from loguru import logger
 from pipeline.asking.answers import as_text, write_answer
 from pipeline.asking.cache import QUERY_CACHE
 from pipeline.asking.query import ask
-from pipeline.asking.showing import show_answer
-from pipeline.config import load_run_config
 from pipeline.errors import ArtifactError
 from pipeline.execution.commands import run_command
 from pipeline.execution.stage import RunFolder
@@ -45,8 +44,14 @@ def query(
         return
     if in_use(folder):
         logger.warning("{} is being worked in: this is its last whole state", folder.path)
+    started = time.perf_counter()
     answer = ask(sql, made, folder.state(QUERY_CACHE))
+    logger.info("answered in {:.2f} s", time.perf_counter() - started)
     if show:
+        # Recordings and their messages take seconds to load, and few answers are shown.
+        from pipeline.asking.showing import show_answer
+        from pipeline.config import load_run_config
+
         config = load_run_config(folder.config)
         recording = show_answer(answer, made, config, folder.path / "query.rrd")
         logger.info("{}: open it by .venv/bin/rerun {}", recording, recording)

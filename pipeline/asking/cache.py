@@ -18,7 +18,7 @@ from filelock import FileLock
 
 from pipeline.artifacts.digests import content_digests
 from pipeline.artifacts.publishing import published
-from pipeline.asking.rows import NONE, ROWS, Part, Values, Words
+from pipeline.asking.columns import NONE, Part, Values, Words
 from pipeline.errors import ArtifactError
 from schemas.tables import BY_NAME, TEXT, Column, Table
 
@@ -53,6 +53,9 @@ def arrow_table(name: str, artifact: Path, cache: Path) -> pa.Table:
     with FileLock(cache / f"{name}.lock"):
         path = _file_of(name, artifact, cache)
         if not path.is_file():
+            # What reads messages takes seconds to load, and most questions find their tables made.
+            from pipeline.asking.rows import ROWS
+
             with published(path) as scratch:
                 write_rows(scratch, BY_NAME[name], ROWS[name](artifact))
             _remove_former(name, path)

@@ -8,7 +8,7 @@ import pyarrow as pa
 from pipeline.artifacts.digests import MEMO, content_digests
 from pipeline.artifacts.reading import read_provenance
 from pipeline.asking.cache import GrowingColumn, arrow_schema
-from pipeline.asking.rows import words
+from pipeline.asking.columns import words
 from schemas.tables import INPUTS
 
 

@@ -1,77 +1,29 @@
 """Artifacts → the columns of `schemas.tables`, part by part; no cloud and no picture is read."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float, Integer
+from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
 from pipeline.artifacts import from_tensor, open_artifact, read_provenance
 from pipeline.artifacts.sharding import read_index
+from pipeline.asking.columns import Part, Words, one_word, words
 from pipeline.clutter.levels import level_of
-from pipeline.errors import ArtifactError, ContentError
+from pipeline.errors import ArtifactError
 from pipeline.geometry.shape import ShapeClass
 from pipeline.labelling.grasps import GraspOrigin, LabelledGrasps
 from pipeline.messages.grasps import read_grasps
 from pipeline.messages.samples import samples_of
 from pipeline.network.samples import Samples
-from pipeline.read_only import read_only
 from schemas.softgrip.v1.evaluation_pb2 import Attempt
 from schemas.softgrip.v1.objects_pb2 import CatalogueObject, RefusedMesh
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 from schemas.softgrip.v1.scenes_pb2 import Scene
 from schemas.softgrip.v1.training_pb2 import Epoch
 
-NONE = -1  # a word that is not there
 CLASSES = tuple(str(shape_class) for shape_class in ShapeClass)
-
-
-@dataclass(frozen=True)
-class Words:
-    """A column of words.
-
-    Attributes
-    ----------
-    names
-        The words.
-    index
-        Which of them each row has, shape (n,); -1 where it has none.
-
-    Raises
-    ------
-    ContentError
-        A row has a word that is not there.
-    """
-
-    names: tuple[str, ...]
-    index: Integer[np.ndarray, " n"]
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "index", read_only(self.index))
-        if len(self.index) and int(self.index.max()) >= len(self.names):
-            raise ContentError(f"A row has word {self.index.max()} of {len(self.names)}")
-
-    def __len__(self) -> int:
-        return len(self.index)
-
-
-Values = Words | np.ndarray
-Part = Mapping[str, Values]
-"""Column → its values, all of one length."""
-
-
-def words(values: Sequence[str]) -> Words:
-    """A column of the words given; an empty one is none."""
-    names = tuple(sorted({value for value in values if value}))
-    number = {name: index for index, name in enumerate(names)} | {"": NONE}
-    return Words(names, np.array([number[value] for value in values], dtype=np.int64))
-
-
-def one_word(value: str, rows: int) -> Words:
-    """A column that has one word in every row."""
-    return Words((value,) if value else (), np.full(rows, 0 if value else NONE))
 
 
 def pose_columns(world_from_thing: Float[np.ndarray, "n 4 4"]) -> dict[str, np.ndarray]:

@@ -7,7 +7,8 @@ import pytest
 
 from pipeline.asking import cache as tables
 from pipeline.asking.cache import arrow_table, rows_noted, write_rows
-from pipeline.asking.rows import Part, Words
+from pipeline.asking.columns import Part, Words
+from pipeline.asking.rows import ROWS
 from pipeline.errors import ArtifactError
 from schemas.tables import BY_NAME
 
@@ -28,7 +29,7 @@ def test_rows_are_the_same_however_many_stand_in_a_batch(
     monkeypatch.setattr(tables, "BATCH_ROWS", batch)
     artifact = tmp_path / "shards.mcap"
     artifact.touch()
-    monkeypatch.setitem(tables.ROWS, "samples", lambda _: iter(parts()))  # type: ignore[arg-type]
+    monkeypatch.setitem(ROWS, "samples", lambda _: iter(parts()))  # type: ignore[arg-type]
     found = arrow_table("samples", artifact, tmp_path / "query")
     assert found.column("q").to_pylist() == [0.5, None, 0.25, None]
     assert found.column("object").to_pylist() == ["box", "cup", "dice", None]
@@ -38,7 +39,7 @@ def test_rows_are_the_same_however_many_stand_in_a_batch(
 
 def test_what_was_noted_is_not_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     artifact = tmp_path / "shards.mcap"
-    monkeypatch.setitem(tables.ROWS, "samples", None)  # type: ignore[arg-type]
+    monkeypatch.setitem(ROWS, "samples", None)  # type: ignore[arg-type]
     with rows_noted("samples", artifact, tmp_path / "query") as note:
         for part in parts():
             note(part)
