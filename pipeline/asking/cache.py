@@ -1,14 +1,12 @@
 """Tables as Arrow files in a run's state, each by the digest of the artifact that it was read from.
 
-An artifact is read once, or not at all where its stage noted the rows as it wrote them; from then
-on a question maps the file and touches only the columns that it names. While a stage is made anew
-its artifact, the index last of all, stays as it was, and so does the table: what is asked meanwhile
-is the last whole state. `make prune` frees the files.
+An artifact is read once; from then on a question maps the file and touches only the columns that
+it names. While a stage is made anew its artifact, the index last of all, stays as it was, and so
+does the table: what is asked meanwhile is the last whole state. `make prune` frees the files.
 """
 
 import hashlib
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Self
 
@@ -58,35 +56,10 @@ def arrow_table(name: str, artifact: Path, cache: Path) -> pa.Table:
 
             with published(path) as scratch:
                 write_rows(scratch, BY_NAME[name], ROWS[name](artifact))
-            _remove_former(name, path)
+            for older in cache.glob(f"{name}-*.arrow"):
+                if older != path:
+                    older.unlink()
     return pa.ipc.open_file(pa.memory_map(str(path))).read_all()
-
-
-@contextmanager
-def rows_noted(name: str, artifact: Path, cache: Path) -> Iterator[Callable[[Part], None]]:
-    """Let a stage note the rows of a table while it writes them, so that no one reads them again.
-
-    Parameters
-    ----------
-    name
-        Of the table.
-    artifact
-        The artifact that will hold its rows; it is written when the block ends.
-    cache
-        Folder of the Arrow files.
-
-    Yields
-    ------
-    Callable[[Part], None]
-        Takes rows, in the order of the artifact.
-    """
-    cache.mkdir(parents=True, exist_ok=True)
-    with published(cache / f"{name}.noted") as scratch, RowsFile(scratch, BY_NAME[name]) as rows:
-        yield rows.add
-    with FileLock(cache / f"{name}.lock"):
-        path = _file_of(name, artifact, cache)
-        (cache / f"{name}.noted").rename(path)
-        _remove_former(name, path)
 
 
 def _file_of(name: str, artifact: Path, cache: Path) -> Path:
@@ -95,12 +68,6 @@ def _file_of(name: str, artifact: Path, cache: Path) -> Path:
     described = repr((CACHE_VERSION, BY_NAME[name])).encode()
     version = hashlib.sha256(described).hexdigest()[:DIGITS]
     return cache / f"{name}-{digest[:DIGITS]}-{version}.arrow"
-
-
-def _remove_former(name: str, path: Path) -> None:
-    for older in path.parent.glob(f"{name}-*.arrow"):
-        if older != path:
-            older.unlink()
 
 
 def write_rows(path: Path, table: Table, parts: Iterator[Part]) -> None:

@@ -1,4 +1,4 @@
-"""Rows that a stage notes are those that would be read from its artifact; all batches are whole."""
+"""Rows become the same table however many of them stand in a batch."""
 
 from pathlib import Path
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pipeline.asking import cache as tables
-from pipeline.asking.cache import arrow_table, rows_noted, write_rows
+from pipeline.asking.cache import arrow_table, write_rows
 from pipeline.asking.columns import Part, Words
 from pipeline.asking.rows import ROWS
 from pipeline.errors import ArtifactError
@@ -29,36 +29,12 @@ def test_rows_are_the_same_however_many_stand_in_a_batch(
     monkeypatch.setattr(tables, "BATCH_ROWS", batch)
     artifact = tmp_path / "shards.mcap"
     artifact.touch()
-    monkeypatch.setitem(ROWS, "samples", lambda _: iter(parts()))  # type: ignore[arg-type]
+    monkeypatch.setitem(ROWS, "samples", lambda _: iter(parts()))
     found = arrow_table("samples", artifact, tmp_path / "query")
     assert found.column("q").to_pylist() == [0.5, None, 0.25, None]
     assert found.column("object").to_pylist() == ["box", "cup", "dice", None]
     assert found.column("sample").to_pylist() == [None, None, None, 7]
     assert found.column("split").null_count == 4
-
-
-def test_what_was_noted_is_not_read_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    artifact = tmp_path / "shards.mcap"
-    monkeypatch.setitem(ROWS, "samples", None)  # type: ignore[arg-type]
-    with rows_noted("samples", artifact, tmp_path / "query") as note:
-        for part in parts():
-            note(part)
-        artifact.write_bytes(b"written last")
-    assert arrow_table("samples", artifact, tmp_path / "query").num_rows == 4
-    artifact.write_bytes(b"another one")
-    with pytest.raises(TypeError):
-        arrow_table("samples", artifact, tmp_path / "query")
-
-
-def test_rows_of_a_stage_that_failed_are_no_table(tmp_path: Path) -> None:
-    def fail() -> None:
-        with rows_noted("samples", tmp_path / "shards.mcap", tmp_path / "query") as note:
-            note(parts()[0])
-            raise ValueError("lost")
-
-    with pytest.raises(ValueError, match="lost"):
-        fail()
-    assert list((tmp_path / "query").iterdir()) == []
 
 
 def test_a_column_that_the_table_lacks_is_refused(tmp_path: Path) -> None:
