@@ -12,7 +12,7 @@ from loguru import logger
 
 from pipeline.artifacts import ArtifactWriter, publish_bytes
 from pipeline.execution import StageContext, Summary, stage_command
-from pipeline.messages.attempts import read_attempts, tried_contacts
+from pipeline.execution.training_samples import TrainingSet, open_training_set, readers_ahead
 from pipeline.messages.sample_cache import cached_split
 from pipeline.messages.training import (
     BASELINE,
@@ -28,10 +28,9 @@ from pipeline.network.fine_tuning import measure_fine_tuning, starting_network
 from pipeline.network.fitted_baselines import fit_baselines
 from pipeline.network.ga_cnn import parameter_count
 from pipeline.network.held_out import TestFigures, measure_held_out
-from pipeline.network.outcomes import outcome_samples, with_outcomes
 from pipeline.network.parallel import ALONE, Ranks, join_ranks
 from pipeline.network.resuming import EpochMetrics
-from pipeline.network.samples import GraspTensors, Samples
+from pipeline.network.samples import Samples
 from pipeline.network.sources import baseline_to_json
 from pipeline.network.timing import runtimes_ms_a_grasp
 from pipeline.network.training import TrainedNetwork, choose_device, train
@@ -46,28 +45,35 @@ SAMPLES = "samples"  # folder of the decoded shards, in the run's state
 def build(stage: StageContext, ranks: Ranks = ALONE) -> Summary:
     """Train GA-CNN on the train split, stop by the val split, report on the test split."""
     config = stage.config
-    train_set, val_set, test_set = (split_of(stage, name) for name in ("train", "val", "test"))
+    train_set = training_set(stage)
+    val_set, test_set = (
+        cached_split(stage.upstream("shards"), name, stage.folder.state(SAMPLES))
+        for name in ("val", "test")
+    )
     begun = stage.inputs.get(STARTING_NETWORK)
     start = starting_network(begun.read_bytes(), str(begun), config.network) if begun else None
+    # On a CPU readers would take the cores that train.
     on_gpu = choose_device(config.train.device, ranks).type == "cuda"
+    readers = max(stage.workers // ranks.count, 1) if on_gpu else 0
     trained = train(
         config.train,
         config.network,
         config.seed,
-        train_tensors(stage, train_set),
+        train_set.learned,
         val_set.tensors,
         stage.folder.state("train"),
         print_epoch,
         ranks,
-        # On a CPU readers would take the cores that train.
-        loader_workers=max(stage.workers // ranks.count, 1) if on_gpu else 0,
+        loader_workers=readers_ahead(readers, config.train.batch_size, val_set),
         show_progress=True,
         start=start,
     )
     if not ranks.first:
         return {}
-    fitted = fit_baselines(train_set, config.gripper, config.train.baseline_samples)
-    figures = measure_held_out(trained.network, config.train, fitted, train_set, val_set, test_set)
+    fitted = fit_baselines(train_set.fitted, config.gripper, config.train.baseline_samples)
+    figures = measure_held_out(
+        trained.network, config.train, fitted, train_set.count, val_set, test_set
+    )
     tuned = (
         measure_fine_tuning(start, trained.network, config.train, test_set.tensors)
         if start
@@ -94,27 +100,11 @@ def build(stage: StageContext, ranks: Ranks = ALONE) -> Summary:
     return summary(stage, trained, figures, ranks) | told | {"inference_ms_a_grasp": inference}
 
 
-def split_of(stage: StageContext, split: str) -> Samples:
-    """A split's samples, decoded from its shards once and mapped from there."""
-    return cached_split(stage.upstream("shards"), split, stage.folder.state(SAMPLES))
-
-
-def train_tensors(stage: StageContext, train_set: Samples) -> GraspTensors:
-    """The train split and, where ``train.attempts`` names some, what logged attempts lifted."""
-    files = [path for name, path in sorted(stage.inputs.items()) if name.startswith(ATTEMPTS)]
-    if not files:
-        return train_set.tensors
-    wanted = stage.config.train
-    tried = tried_contacts(read_attempts(files))
-    outcomes = outcome_samples(tried, train_set.quality, wanted.attempt_good_quality)
-    logger.info(
-        "train: {} tried contacts, of which {} lifted, {} times each beside {} samples",
-        len(outcomes),
-        int(tried.lifted.sum()),
-        wanted.attempt_repeats,
-        len(train_set),
-    )
-    return with_outcomes(train_set.tensors, outcomes, wanted.attempt_repeats)
+def training_set(stage: StageContext) -> TrainingSet:
+    """The train split, opened before anything is decoded, and tried contacts if there are some."""
+    attempts = [path for name, path in sorted(stage.inputs.items()) if name.startswith(ATTEMPTS)]
+    cache = stage.folder.state(SAMPLES)
+    return open_training_set(stage.config, stage.upstream("shards"), cache, attempts)
 
 
 def print_epoch(epoch: EpochMetrics) -> None:

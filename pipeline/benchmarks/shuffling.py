@@ -26,6 +26,7 @@ VERTICES = 573  # of the pad of Supplement II
 SEEN = 0.6  # share of cells that hold a point, as in run paper
 # Of ten scenes eight are trained on, as [split] has it.
 SPLIT_OF = ("train", "train", "val", "train", "train", "test", "train", "train", "train", "train")
+DISTINCT_SCENES = 10  # one for each entry of the above
 OBJECTS = 10  # in a scene
 LIMITS = 8  # of Eq. (8)-(11)
 
@@ -70,7 +71,9 @@ def peak_mib(samples: int, settings: str = "", workers: int = 1) -> float:
     return used.ru_maxrss / 1024
 
 
-def write_synthetic_grasps(run: Path, samples: int, scene: int = SCENE) -> Path:
+def write_synthetic_grasps(
+    run: Path, samples: int, scene: int = SCENE, distinct: int = DISTINCT_SCENES
+) -> Path:
     """Write grasps of random numbers as stage grasps would, each cloud within its cells.
 
     Parameters
@@ -81,6 +84,9 @@ def write_synthetic_grasps(run: Path, samples: int, scene: int = SCENE) -> Path:
         How many.
     scene
         Samples of a scene, which is a shard.
+    distinct
+        Scenes that are written; the others are links to them, so that writing costs little. A
+        multiple of ten.
 
     Returns
     -------
@@ -90,18 +96,24 @@ def write_synthetic_grasps(run: Path, samples: int, scene: int = SCENE) -> Path:
     count = -(-samples // scene)
     for number in range(count):
         path = shard_path(run / "grasps", number, count)
-        rng = np.random.default_rng(number)
-        split = SPLIT_OF[number % len(SPLIT_OF)]
         rows = min(scene, samples - number * scene)
-        batches = [
-            (synthetic_origin(number, split), synthetic_grasps(min(BATCH, rows - at), rng))
-            for at in range(0, rows, BATCH)
-        ]
-        with ArtifactWriter(path, PROVENANCE) as artifact:
-            write_grasps(artifact, batches, BATCH, rounded=True)
+        split = SPLIT_OF[number % len(SPLIT_OF)]
+        if distinct <= number and rows == scene:
+            path.hardlink_to(shard_path(run / "grasps", number % distinct, count))
+        else:
+            write_scene(path, number, split, rows)
         entries.append(shard_entry(path, run, rows, split))
     write_index(index, PROVENANCE, entries, np.zeros(TENTHS))
     return index
+
+
+def write_scene(path: Path, number: int, split: str, rows: int) -> None:
+    """Write the shard of one scene of random numbers."""
+    rng, origin = np.random.default_rng(number), synthetic_origin(number, split)
+    sizes = [min(BATCH, rows - at) for at in range(0, rows, BATCH)]
+    with ArtifactWriter(path, PROVENANCE) as artifact:
+        batches = [(origin, synthetic_grasps(size, rng)) for size in sizes]
+        write_grasps(artifact, batches, BATCH, rounded=True)
 
 
 def synthetic_origin(scene: int, split: str) -> GraspOrigin:

@@ -1,4 +1,4 @@
-"""[shards], [network], [train] and [sweep]: dataset files, GA-CNN, its training, its family."""
+"""[shards], [network], [train], [loading], [sweep]: files, GA-CNN, its training, its family."""
 
 from typing import Annotated, Literal
 
@@ -71,6 +71,12 @@ class TrainConfig(Section):
 
     epochs: int = Field(30, ge=1, le=10_000, description="passes over the training samples")
     batch_size: int = Field(128, ge=2, le=65536, description="samples in one step")
+    shuffle_window: int = Field(
+        0,
+        ge=0,
+        description="an epoch's order is drawn among so many neighbouring samples at a time, and "
+        "no more need to be decoded at once; 0: among all",
+    )
     learning_rate: float = Field(2e-3, gt=0, le=1, description="highest rate of the schedule")
     weight_decay: float = Field(0.02, ge=0, le=1, description="of AdamW; not on norms and biases")
     warmup_fraction: float = Field(0.1, ge=0, lt=1, description="share of steps with rising rate")
@@ -108,6 +114,14 @@ class TrainConfig(Section):
     threads: int = Field(2, ge=1, le=256, description="CPU threads; part of the run's identity")
     device: Literal["auto", "cpu", "cuda"] = Field(
         "auto", description="'auto' takes a GPU where there is one"
+    )
+
+
+class LoadingConfig(Section):
+    """What training may take of the disk; no result depends on it."""
+
+    cache_mib: int = Field(
+        32768, ge=1, description="decoded samples kept in the run's state at once, at most [MiB]"
     )
 
 

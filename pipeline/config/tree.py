@@ -36,7 +36,13 @@ from pipeline.config.grasps import (
     SensingConfig,
 )
 from pipeline.config.holdout import HoldoutConfig
-from pipeline.config.learning import NetworkConfig, ShardsConfig, SweepConfig, TrainConfig
+from pipeline.config.learning import (
+    LoadingConfig,
+    NetworkConfig,
+    ShardsConfig,
+    SweepConfig,
+    TrainConfig,
+)
 from pipeline.config.objects import ObjectsConfig, SplitConfig
 from pipeline.config.predict import PredictConfig
 from pipeline.config.referee import RefereeConfig
@@ -82,6 +88,7 @@ class RunConfig(Section):
     shards: ShardsConfig = ShardsConfig()
     network: NetworkConfig = NetworkConfig()
     train: TrainConfig = TrainConfig()
+    loading: LoadingConfig = LoadingConfig()
     sweep: SweepConfig = SweepConfig()
     referee: RefereeConfig = RefereeConfig()
     agreement: AgreementConfig = AgreementConfig()

@@ -101,7 +101,7 @@ def measure_held_out(
     network: GaCnn,
     config: TrainConfig,
     fitted: FittedBaselines,
-    train_set: Samples,
+    train_count: int,
     val_set: Samples,
     test_set: Samples,
 ) -> TestFigures:
@@ -110,13 +110,13 @@ def measure_held_out(
     Parameters
     ----------
     network
-        Trained on ``train_set``, best epoch chosen by ``val_set``.
+        Trained on the training samples, best epoch chosen by ``val_set``.
     config
         Batch size and threads to predict with; whether symmetries are averaged over.
     fitted
-        The baselines, fitted to ``train_set``.
-    train_set
-        Training samples.
+        The baselines, fitted to training samples.
+    train_count
+        Number of training samples.
     val_set
         Validation samples, of other objects.
     test_set
@@ -155,7 +155,7 @@ def measure_held_out(
             (found.mean_predicted, found.mean_quality, found.count)
             for found in calibration(predicted, quality)
         ],
-        train_count=len(train_set),
+        train_count=train_count,
         val_count=len(val_set),
     )
 

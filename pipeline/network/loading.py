@@ -5,12 +5,18 @@ costs a copy of their bytes. An epoch is one permutation of *all* samples, acros
 follows from (seed, epoch) alone; it is cut into batches, and each batch into as many parts as there
 are processes. Which process or loader worker reads a sample therefore changes nothing, a batch's
 number is all that a resumed epoch needs, and no sample is lost or doubled.
+
+Where not all decoded samples fit (``messages.bounded_samples``), the permutation is of blocks of
+neighbouring samples, and within each block. Shards are shuffled themselves, so a block is already a
+random part of all.
 """
 
 import math
+import shutil
 import time
 from collections.abc import Iterable, Iterator
-from typing import TypeVar
+from pathlib import Path
+from typing import Literal, TypeVar
 
 import numpy as np
 import torch
@@ -19,9 +25,13 @@ from torch import Tensor
 from torch.utils.data import DataLoader, Dataset
 
 from pipeline.errors import ConfigError
-from pipeline.network.samples import GraspTensors
+from pipeline.network.mapped_parts import MappedPart, mapped_part
+from pipeline.network.samples import GraspTensors, Rows, SampleReader
 
 T = TypeVar("T")
+StartMethod = Literal["fork", "spawn", "forkserver"]
+SHARED_MEMORY = Path("/dev/shm")
+BATCHES_AHEAD = 2  # of each reader, as PyTorch's loader has it
 RawBatch = tuple[Int[Tensor, " b"], Float[Tensor, "b h w 3"], Bool[Tensor, "b h w"], Tensor]
 
 
@@ -31,10 +41,35 @@ def batch_count(samples: int, batch_size: int) -> int:
 
 
 def epoch_batches(
-    samples: int, batch_size: int, rng: np.random.Generator
+    samples: int, batch_size: int, rng: np.random.Generator, window: int = 0
 ) -> list[Int[np.ndarray, " _"]]:
-    """Indices of each batch of an epoch: a permutation cut into parts of nearly equal size."""
-    return np.array_split(rng.permutation(samples), batch_count(samples, batch_size))
+    """Indices of each batch of an epoch: its order cut into parts of nearly equal size."""
+    order = epoch_order(samples, window, rng)
+    return np.array_split(order, batch_count(samples, batch_size))
+
+
+def epoch_order(samples: int, window: int, rng: np.random.Generator) -> Int[np.ndarray, " samples"]:
+    """The order of an epoch's samples.
+
+    Parameters
+    ----------
+    samples
+        How many there are.
+    window
+        Most neighbouring samples that are permuted together; 0: all.
+    rng
+        Of the epoch.
+
+    Returns
+    -------
+    Numbers of the samples. Blocks begin at a drawn sample, so those of another epoch are others.
+    """
+    if not window or window >= samples:
+        return rng.permutation(samples)
+    in_turn = (rng.integers(samples) + np.arange(samples)) % samples
+    blocks = np.array_split(in_turn, -(-samples // window))
+    drawn = rng.permutation(len(blocks))
+    return np.concatenate([rng.permutation(blocks[block]) for block in drawn])
 
 
 def part_of_rank(
@@ -72,10 +107,8 @@ def part_of_rank(
 class SampleBatches(Dataset[RawBatch]):
     """Item k: indices, clouds, masks and qualities of the samples ``batches[k]``."""
 
-    def __init__(self, samples: GraspTensors, batches: list[Int[np.ndarray, " _"]]) -> None:
-        # Plain arrays over the same memory: indexing a np.memmap itself costs more.
-        self._cloud, self._mask = np.asarray(samples.cloud), np.asarray(samples.mask)
-        self._quality = np.asarray(samples.quality, dtype=np.float32)
+    def __init__(self, samples: SampleReader, batches: list[Int[np.ndarray, " _"]]) -> None:
+        self._samples = MappedRows(samples) if isinstance(samples, GraspTensors) else samples
         self._batches = batches
 
     def __len__(self) -> int:
@@ -83,16 +116,44 @@ class SampleBatches(Dataset[RawBatch]):
 
     def __getitem__(self, number: int) -> RawBatch:
         indices = self._batches[number]
+        cloud, mask, quality = self._samples.rows(indices)
         return (
             torch.from_numpy(indices),
-            torch.from_numpy(self._cloud[indices]),
-            torch.from_numpy(self._mask[indices]),
-            torch.from_numpy(self._quality[indices]),
+            torch.from_numpy(cloud),
+            torch.from_numpy(mask),
+            torch.from_numpy(np.asarray(quality, dtype=np.float32)),
         )
 
 
+class MappedRows:
+    """Samples of mapped files; another process maps the files itself."""
+
+    def __init__(self, samples: GraspTensors) -> None:
+        self._arrays: tuple[np.ndarray, ...] = (samples.cloud, samples.mask, samples.quality)
+        self._map()
+
+    def rows(self, numbers: Int[np.ndarray, " b"]) -> Rows:
+        """Copies of some samples, in the order of their numbers."""
+        return Rows(*(array[numbers] for array in self._plain))
+
+    def _map(self) -> None:
+        # Plain arrays over the same memory: indexing a np.memmap itself costs more.
+        self._plain = tuple(np.asarray(array) for array in self._arrays)
+
+    def __getstate__(self) -> list[MappedPart | np.ndarray]:
+        return [mapped_part(array) or array for array in self._arrays]
+
+    def __setstate__(self, state: list[MappedPart | np.ndarray]) -> None:
+        self._arrays = tuple(p.opened() if isinstance(p, MappedPart) else p for p in state)
+        self._map()
+
+
 def load_batches(
-    samples: GraspTensors, batches: list[Int[np.ndarray, " _"]], workers: int, pinned: bool
+    samples: SampleReader,
+    batches: list[Int[np.ndarray, " _"]],
+    workers: int,
+    pinned: bool,
+    start_method: StartMethod | None = None,
 ) -> Iterator[RawBatch]:
     """Read the batches in order, in this process or ahead of it in others.
 
@@ -106,6 +167,8 @@ def load_batches(
         Processes that read ahead; 0: this one reads.
     pinned
         Whether batches are put in memory that a GPU copies from fastest.
+    start_method
+        How processes are started; None: as Python does on this system.
 
     Yields
     ------
@@ -122,7 +185,28 @@ def load_batches(
         num_workers=workers,
         pin_memory=pinned,
         generator=torch.Generator(),  # the global one stays as it is
+        multiprocessing_context=start_method if workers else None,
     )
+
+
+def readers_with_room(workers: int, batch_bytes: int) -> int:
+    """Processes that may read ahead: none where the system's shared memory cannot hold batches.
+
+    They hand batches over in it, and one that finds it full is ended by the system without a word.
+
+    Parameters
+    ----------
+    workers
+        Processes that are wanted.
+    batch_bytes
+        Of a batch as it is read [bytes].
+
+    Returns
+    -------
+    As many as wanted, or 0.
+    """
+    needed = workers * (BATCHES_AHEAD + 1) * batch_bytes
+    return workers if shutil.disk_usage(SHARED_MEMORY).free >= needed else 0
 
 
 class WaitClock:

@@ -2,9 +2,10 @@
 
 import hashlib
 from dataclasses import dataclass, fields
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Bool, Float, Integer
+from jaxtyping import Bool, Float, Int, Integer
 
 from pipeline.errors import ArtifactError
 
@@ -12,6 +13,28 @@ SPLITS = ("train", "val", "test")
 _REMEDY = "Make the shards again."
 # So many samples show which way the grid lies.
 _ORIENTATION_SAMPLES = 64
+
+
+class Rows(NamedTuple):
+    """What the network learns from of some samples: clouds, masks and qualities of one length b."""
+
+    cloud: Float[np.ndarray, "b h w 3"]
+    mask: Bool[np.ndarray, "b h w"]
+    quality: Float[np.ndarray, " b"]
+
+
+@runtime_checkable
+class SampleReader(Protocol):
+    """Samples that are read by number, wherever they lie; another process gets it by paths."""
+
+    def __len__(self) -> int:
+        """How many there are."""
+
+    def sha256(self) -> str:
+        """Digest of the content, as hex."""
+
+    def rows(self, numbers: Int[np.ndarray, " b"]) -> Rows:
+        """Copies of some samples, in the order of their numbers."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +83,10 @@ class GraspTensors:
 
     def __len__(self) -> int:
         return len(self.quality)
+
+    def rows(self, numbers: Int[np.ndarray, " b"]) -> Rows:
+        """Copies of some samples, in the order of their numbers."""
+        return Rows(self.cloud[numbers], self.mask[numbers], self.quality[numbers])
 
     def sha256(self) -> str:
         """Digest of the content, as hex."""

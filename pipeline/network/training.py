@@ -47,7 +47,7 @@ from pipeline.network.resuming import (
     load_training_state,
     save_training_state,
 )
-from pipeline.network.samples import GraspTensors
+from pipeline.network.samples import GraspTensors, SampleReader
 from pipeline.progress import progress
 
 # Rises whenever the loop changes what it computes: a state of another version is not continued.
@@ -93,7 +93,7 @@ def train(
     config: TrainConfig,
     network: NetworkConfig,
     seed: int,
-    train_set: GraspTensors,
+    train_set: SampleReader,
     val_set: GraspTensors,
     state_dir: Path,
     on_epoch: Callable[[EpochMetrics], None],
@@ -170,7 +170,7 @@ def train(
         while not _finished(state.history, config):
             epoch = len(state.history)
             rng = np.random.default_rng((seed, epoch))
-            batches = epoch_batches(len(train_set), config.batch_size, rng)
+            batches = epoch_batches(len(train_set), config.batch_size, rng, config.shuffle_window)
             symmetry = rng.integers(0, SYMMETRIES, len(train_set)) if config.augment else None
             mine = part_of_rank(batches, ranks.rank, ranks.count)[state.batch :]
             loaded = load_batches(train_set, mine, loader_workers, pinned=device.type == "cuda")
@@ -380,7 +380,7 @@ def _identity(
     config: TrainConfig,
     network: NetworkConfig,
     seed: int,
-    train_set: GraspTensors,
+    train_set: SampleReader,
     val_set: GraspTensors,
     device: torch.device,
     start: GaCnn | None,

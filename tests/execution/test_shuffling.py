@@ -38,7 +38,7 @@ SETTINGS = f"seed = 3\n[shards]\nsamples_per_part = {PART}\nsamples_per_shard = 
 def grasps(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a run up to its grasps."""
     folder = tmp_path_factory.mktemp("shuffled") / "run"
-    write_synthetic_grasps(folder, SAMPLES, SCENE)
+    write_synthetic_grasps(folder, SAMPLES, SCENE, distinct=SAMPLES // SCENE)
     (folder / "run.toml").write_text(SETTINGS)
     return folder
 

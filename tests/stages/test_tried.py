@@ -13,9 +13,10 @@ from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder
 from pipeline.execution.staleness import stage_context
 from pipeline.messages.attempts import read_attempts, tried_contacts
+from pipeline.network.samples import GraspTensors
 from schemas.softgrip.v1.evaluation_pb2 import Attempt
 from stages.graph import TRAIN, inputs_of
-from stages.train import split_of, train_tensors
+from stages.train import training_set
 from stages.tried import tried
 
 
@@ -53,16 +54,17 @@ def test_a_training_takes_what_logged_attempts_lifted(run: RunFolder, tmp_path: 
     stage = stage_context(TRAIN, folder, inputs_of, None, 1)
     assert "attempts/0" in stage.inputs
     assert stage.key != without.key
-    train_set = split_of(stage, "train")
+    opened = training_set(stage)
+    train_set, joined = opened.fitted, opened.learned
+    assert isinstance(joined, GraspTensors)
     contacts = tried_contacts(read_attempts([logged / "attempt_00000.mcap"]))
-    joined = train_tensors(stage, train_set)
     seen = contacts.mask.any(axis=(1, 2))
     assert len(joined) == len(train_set) + 2 * seen.sum()
     good = train_set.quality >= 0.5
     high, low = train_set.quality[good].mean(), train_set.quality[~good].mean()
     behind = joined.quality[len(train_set) :]
     assert behind == pytest.approx(np.tile(np.where(contacts.lifted[seen], high, low), 2))
-    assert len(train_tensors(without, train_set)) == len(train_set)
+    assert len(training_set(without).learned) == len(train_set) == opened.count
 
 
 def test_attempts_that_cannot_be_used_are_told(run: RunFolder, tmp_path: Path) -> None:
