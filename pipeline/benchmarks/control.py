@@ -80,7 +80,7 @@ def step_ms(
             depth_m, _ = measure_depth(window, surfaces, None, rng)
             picture = DepthPicture(depth_m, window)
             times.append(time.perf_counter())
-            found = local.look(picture, aim)
+            found = local.look(picture, aim, config.evaluate.policy.correction_gain)
             local.advance_aim(aim)
             if found is None:
                 break  # too steep a place: no network was asked

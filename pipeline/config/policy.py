@@ -97,6 +97,7 @@ class PolicyConfig(ScaledSection):
     standoff_m: ClassVar[LengthInMetres] = LengthInMetres()
     correction_radius_m: ClassVar[LengthInMetres] = LengthInMetres()
     commit_m: ClassVar[LengthInMetres] = LengthInMetres()
+    align_m: ClassVar[LengthInMetres] = LengthInMetres()
     look_m: ClassVar[LengthInMetres] = LengthInMetres()
     another_m: ClassVar[LengthInMetres] = LengthInMetres()
     regrasp_lever_m: ClassVar[LengthInMetres] = LengthInMetres()
@@ -158,6 +159,14 @@ class PolicyConfig(ScaledSection):
     )
     commit_rg: float = Field(
         1.2, ge=0, description="this near to the contact nothing is corrected any more [r_G]"
+    )
+    align_rg: float = Field(
+        0.04,
+        gt=0,
+        description="the pad goes down along the approach's axis where it is this near to it [r_G]",
+    )
+    align_rad: float = Field(
+        0.02, gt=0, le=1, description="and the axes differ by less than this [rad]"
     )
     look_rg: float = Field(
         2.4,

@@ -17,11 +17,12 @@ def correct_aim(
     config: EvaluateConfig,
     normal_radius_m: float,
     rng: np.random.Generator,
+    gain: float,
 ) -> tuple[Float[np.ndarray, "4 4"], float] | None:
     """Choose the pose to aim at after a new picture of the wrist's camera.
 
     The measured point nearest to the aim is the first candidate. Another one is taken only where
-    its quality is higher by ``correction_gain``, so that noise alone does not move the gripper.
+    its quality is higher by ``gain``, so that noise alone does not move the gripper.
 
     Parameters
     ----------
@@ -37,6 +38,8 @@ def correct_aim(
         Radius over which a contact's normal is measured [m].
     rng
         Generator of the candidates.
+    gain
+        What another contact must promise more [1]; inf: none is taken.
 
     Returns
     -------
@@ -63,6 +66,6 @@ def correct_aim(
         return None
     quality = ranking([picture], near)
     best = int(np.argmax(quality))
-    if quality[best] < quality[0] + policy.correction_gain:
+    if quality[best] < quality[0] + gain:
         best = 0
     return near.world_from_contact[best], float(quality[best])

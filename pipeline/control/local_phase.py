@@ -44,10 +44,11 @@ class LocalPhase:
         """Whether the object aimed at was measured to move."""
         return bool(self._motion.velocity_m_s.any())
 
-    def look(self, picture: DepthPicture, aim: Pose) -> tuple[Pose, float] | None:
+    def look(self, picture: DepthPicture, aim: Pose, gain: float) -> tuple[Pose, float] | None:
         """The pose to aim at after a new picture, and its q-hat; None without any candidate.
 
         The picture shows where an object in motion was at the exposure; the aim is where it is now.
+        Another contact must promise ``gain`` more than the present one.
         """
         policy = self._config.policy
         cloud = merged_cloud([picture], policy.voxel_m, policy.above_table_m)
@@ -59,6 +60,7 @@ class LocalPhase:
             self._config,
             self._normal_radius_m,
             self._rng,
+            gain,
         )
         return None if found is None else (self._after(picture.age_s, found[0]), found[1])
 

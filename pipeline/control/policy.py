@@ -14,6 +14,7 @@ is left; the gripper then goes straight down until contact.
 `pipeline.control.decision` the causes with which an attempt ends.
 """
 
+import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -26,7 +27,7 @@ from pipeline.control.global_phase import Choice, GlobalPhase
 from pipeline.control.local_phase import LocalPhase, way_left_m
 from pipeline.control.regrasp import load_place_m
 from pipeline.control.robot import Eyes, Reading, Robot, State
-from pipeline.control.viewpoints import back_off
+from pipeline.control.viewpoints import back_off, is_on_axis
 from pipeline.control.wrench_monitor import Event, WrenchMonitor, hanging_n, trim_pose
 
 Phase = tuple[State, Callable[[], Cause | None]]
@@ -79,6 +80,7 @@ class Attempt:
         self._regrasps_left = config.policy.regrasps if strategy.seals_again else 0
         self._moment_error_nm = robots.moment_error_nm
         self._aim_unmeasured = False
+        self._gain = config.policy.correction_gain
         self.decision = Decision()
 
     def run(self) -> Decision:
@@ -153,7 +155,7 @@ class Attempt:
                 aim = self.decision.world_from_contact
             if self._local.moves and not self._robot.reachable(aim):
                 return Cause.UNREACHABLE
-            ahead = back_off(self._local.predict_meeting(aim, here), -self._search_m())
+            ahead, onto_axis = self._next_pose(self._local.predict_meeting(aim, here), here)
             reading = self._robot.step(ahead, self._policy.speed_m_s)
             self.decision.world_from_contact = self._local.advance_aim(aim)
             event = self._monitor.moving(reading)
@@ -164,10 +166,25 @@ class Attempt:
                 return Cause.UNREACHABLE
             if event is Event.CONTACT:
                 return None
-            if reading.arrived:
+            if reading.arrived and not onto_axis:
                 break
         self._travel(back_off(self._robot.pose(), self._policy.retreat_m + self._search_m()))
         return Cause.NO_CONTACT
+
+    def _next_pose(
+        self, meeting: Float[np.ndarray, "4 4"], here: Float[np.ndarray, "4 4"]
+    ) -> tuple[Float[np.ndarray, "4 4"], bool]:
+        """The pose to go to, and whether that leads onto the approach's axis.
+
+        After a correction the pad is beside the new axis. It is on it by half of the way that is
+        left: on a straight line to below the contact it would touch beside its aim.
+        """
+        left_m = way_left_m(meeting, here)
+        if left_m <= self._policy.align_m or is_on_axis(
+            here, meeting, self._policy.align_m, self._policy.align_rad
+        ):
+            return back_off(meeting, -self._search_m()), False
+        return back_off(meeting, left_m / 2), True
 
     def _search_m(self) -> float:
         """Distance past the expected contact at which the pad stops [m].
@@ -192,7 +209,7 @@ class Attempt:
         picture = self._eyes.wrist(aim[:3, 3], self._policy.look_m)
         if picture is None:
             return Cause.CAMERA_STOPPED
-        found = self._local.look(picture, aim)
+        found = self._local.look(picture, aim, self._gain)
         if found is not None:
             self._aim(*found, [picture])
             self.decision.corrections += 1
@@ -256,7 +273,8 @@ class Attempt:
             return False  # it was held at its centre of mass, as far as is known: a weak seal
         if not self._aim_at(self._global.nearer_to(place, lever_m, self.decision.pictures)):
             return False
-        self._retargets_left = 0  # a choice by the wrench is not changed by pictures
+        # A choice by the wrench is not changed by pictures; they still tell its height and normal.
+        self._retargets_left, self._gain = 0, math.inf
         return True
 
     def _aim_elsewhere(self) -> bool:
@@ -323,7 +341,7 @@ class Attempt:
         if choice is None:
             return False
         self._aim(choice.world_from_contact, choice.quality, self.decision.pictures)
-        self._aim_unmeasured = choice.unmeasured
+        self._aim_unmeasured, self._gain = choice.unmeasured, self._policy.correction_gain
         self._local.start_over()
         return True
 

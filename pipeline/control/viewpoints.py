@@ -85,6 +85,35 @@ def turn_least(
     return pose
 
 
+def is_on_axis(
+    world_from_gripper: Float[np.ndarray, "4 4"],
+    world_from_contact: Float[np.ndarray, "4 4"],
+    within_m: float,
+    within_rad: float,
+) -> bool:
+    """Whether the gripper stands on the axis of a contact, and along it.
+
+    Parameters
+    ----------
+    world_from_gripper
+        The gripper, shape (4, 4).
+    world_from_contact
+        The contact, shape (4, 4).
+    within_m
+        How far beside the axis counts as on it [m].
+    within_rad
+        Angle between the axes that counts as none [rad].
+
+    Returns
+    -------
+    Whether both are kept.
+    """
+    axis = world_from_contact[:3, 2]
+    way = world_from_gripper[:3, 3] - world_from_contact[:3, 3]
+    aside_m = float(np.linalg.norm(way - (way @ axis) * axis))
+    return aside_m <= within_m and bool(world_from_gripper[:3, 2] @ axis >= np.cos(within_rad))
+
+
 def turn_camera_up(
     world_from_gripper: Float[np.ndarray, "4 4"], aside_m: float, above_m: float
 ) -> Float[np.ndarray, "4 4"]:

@@ -170,12 +170,14 @@ def _map(axes: Axes, disc: Disc, values: Float[np.ndarray, " n"], **style: Any) 
 
 
 def _load(axes: Axes, one: ShownSeal) -> None:
-    """What hangs on the pad from the seal on, beside the weight that it bears."""
-    made, since = one.made, one.pad.step
+    """What hangs on the pad after the seal, beside the weight that it bears."""
+    made, since = one.made, one.pad.step + 1  # the step of the seal still pushes
     poses, wrench = from_tensor(made.gripper_path), from_tensor(made.base_wrench)
     hangs_n = -np.einsum("tj,tj->t", poses[since:, 2, :3], wrench[since:, :3])
-    time_s = from_tensor(made.time_s)[since:]
-    axes.plot(time_s - time_s[0], hangs_n, color=rgb(PALETTE[4]), lw=0.8, label="hangs")
+    time_s = from_tensor(made.time_s)
+    axes.plot(
+        time_s[since:] - time_s[one.pad.step], hangs_n, color=rgb(PALETTE[4]), lw=0.8, label="hangs"
+    )
     axes.axhline(made.borne_n, color=rgb(PALETTE[5]), ls="--", lw=0.8, label="bears")
     axes.axhline(made.weight_n, color="0.5", ls=":", lw=0.8, label="weighs")
     axes.set_ylabel("[N]")

@@ -197,6 +197,28 @@ def test_without_corrections_the_first_pose_stands() -> None:
     assert decision.cause is Cause.LIFTED
 
 
+def test_the_pad_touches_where_the_corrected_aim_is() -> None:
+    """What looks best changes on the way down, so that the aim moves sideways late."""
+    robot = FakeRobot(TOP_M)
+    sealed_at: list[np.ndarray] = []
+    switch = robot.vacuum
+
+    def remembered(on: bool) -> None:
+        sealed_at.extend([robot.pose()] * on)
+        switch(on)
+
+    def drifting(_: Sequence[DepthPicture], candidates: Candidates) -> np.ndarray:
+        from_near = robot.state is State.APPROACH and robot.pose()[2, 3] < TOP_M + 0.16
+        aside = candidates.world_from_contact[:, 0, 3] - (0.03 if from_near else 0.0)
+        return np.asarray(np.exp(-np.abs(aside) / 0.01))
+
+    robot.vacuum = remembered  # type: ignore[method-assign]
+    decision, _ = tried(plate(), robot, replace(CLOSED, ranking=drifting))
+    aim = decision.world_from_contact
+    assert aim[0, 3] > 0.01
+    assert np.linalg.norm((sealed_at[0] - aim)[:2, 3]) < 2 * CONFIG.policy.align_m
+
+
 def test_a_place_that_failed_is_not_tried_again() -> None:
     first, _ = tried(plate(), FakeRobot(TOP_M, State.SEAL), OPEN)
     failed = first.world_from_contact[:3, 3]
