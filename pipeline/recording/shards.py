@@ -22,7 +22,7 @@ from schemas.softgrip.v1.samples_pb2 import SampleBatch
 
 TIMELINE = "sample"
 # Clouds are chosen of so many samples: shuffled, they stand for all, and they fit in memory.
-SHOWN_OF = 16384
+SHOWN_OF = 4096
 SHEET_COLUMNS = 10  # clouds in a row of the sheet
 SHEET_SPACING = 3.0  # in r_G: clouds are 2.4 wide
 CELL_RADIUS = 0.04  # a cell is drawn as a ball of this size, in r_G
