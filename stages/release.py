@@ -1,7 +1,8 @@
 """`make release`: RUN's network in the place of the released one, with baseline and figures.
 
-Writes ga_cnn.onnx, ga_cnn.safetensors, analytic.json, figures.json and digests.json of
-``pipeline/network/released``; prints the figures as the tables of its card, which a person writes.
+Writes ga_cnn.onnx, ga_cnn.safetensors, analytic.json, test and train grasps, figures.json and
+digests.json of ``pipeline/network/released``; prints the figures as the tables of its card, which a
+person writes.
 """
 
 import json
@@ -29,12 +30,14 @@ from pipeline.network.released_files import (
     FIGURES_FILE,
     RELEASED_FOLDER,
     TEST_GRASPS_FILE,
+    TRAIN_GRASPS_FILE,
 )
+from pipeline.network.samples import Samples
 from pipeline.network.sources import baseline_to_json, sha256_of
 from pipeline.spread import choose_evenly
 from stages.graph import RUNS_DIR
 
-TEST_GRASPS = 600  # 2 MiB: on which a fine-tuned network shows what it forgot
+SHOWN_GRASPS = 600  # 2 MiB a file: on which a fine-tuned network shows what it forgot
 FITTED = 4000  # training samples that the baselines are fitted to, as for the first release
 
 
@@ -73,12 +76,12 @@ def release(
         "best_constant_mae": float(np.abs(quality - np.median(quality)).mean()),
         "by_object": {one.name: one.figures() for one in errors},
     }
-    some = test_set.take(np.array(choose_evenly(len(test_set), TEST_GRASPS)))
     files = {
         EXPORT: (trained / EXPORT).read_bytes(),
         CHECKPOINT: (trained / CHECKPOINT).read_bytes(),
         BASELINE_FILE: baseline_to_json(fitted.analytic).encode(),
-        TEST_GRASPS_FILE: grasps_to_bytes(some.cloud, some.cloud_mask, some.quality),
+        TEST_GRASPS_FILE: some_grasps(test_set),
+        TRAIN_GRASPS_FILE: some_grasps(train_set),
         FIGURES_FILE: (json.dumps(figures, indent=1) + "\n").encode(),
     }
     for name, data in files.items():
@@ -94,6 +97,12 @@ def release(
     for name, value in figures.items():
         if isinstance(value, float):
             sys.stdout.write(f"{name}: {value:.4f}\n")
+
+
+def some_grasps(samples: Samples) -> bytes:
+    """A file of some of the samples, equally far apart."""
+    some = samples.take(np.array(choose_evenly(len(samples), SHOWN_GRASPS)))
+    return grasps_to_bytes(some.cloud, some.cloud_mask, some.quality)
 
 
 if __name__ == "__main__":

@@ -144,6 +144,12 @@ class GraspsConfig(ScaledSection):
         description="clouds measured of each training grasp: the same label under further draws of "
         "the sensors' noise",
     )
+    noise_shared_by: int = Field(
+        0,
+        ge=0,
+        description="training grasps of one view that share a draw of the sensors' noise; 0: all "
+        "of them, as of one picture",
+    )
     samples_per_message: int = Field(256, ge=1, le=8192)
 
     @model_validator(mode="after")

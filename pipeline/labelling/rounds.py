@@ -37,6 +37,18 @@ class KeptGrasps:
     labels: LabelBatch
     keep_probability: Float[np.ndarray, " n"]
 
+    def dealt(self, most: int) -> list["KeptGrasps"]:
+        """All of them in parts of about equal size, none of more than ``most``; 0: in one part."""
+        count = len(self.keep_probability)
+        parts = max(1, -(-count // most)) if most else 1
+        rows_of = [np.arange(part, count, parts) for part in range(parts)]
+        return [
+            KeptGrasps(
+                self.candidates.take(rows), self.labels.take(rows), self.keep_probability[rows]
+            )
+            for rows in rows_of
+        ]
+
 
 def sample_grasps(
     surface: VisibleSurface,

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -70,7 +71,7 @@ def label_scene(
     -------
     A batch of kept grasps for each viewpoint that sees at least one possible contact, in training
     scenes ``grasps.noise_draws`` times: with the noise of the scene's pictures, then with pictures
-    of its own.
+    of its own. With ``grasps.noise_shared_by`` so few grasps are a batch, with pictures of its own.
 
     Raises
     ------
@@ -94,14 +95,15 @@ def label_scene(
     index_of_body = np.zeros(1 + max(item.body_id for item in scene.objects), dtype=np.int64)
     for item in scene.objects:
         index_of_body[item.body_id] = names.index(item.object_name)
-    draws = noise_draws(scene.split, config)
+    draws, shared_by = noise_draws(scene.split, config), noise_shared_by(scene.split, config)
     batches = []
     for number, share in zip(able, split_evenly(wanted, len(able)), strict=True):
         kept = sample_grasps(seen[number], surfaces, config, share, rng)
         origin = grasp_origin(scene, scene.views[number].camera.name, names)
-        for draw in range(draws):
-            shown = measured if draw == 0 else measure_pictures(scene.views, disturbed, rng)
-            grasps = add_clouds(kept, shown[number], shown, config, rng)
+        for draw, part in product(range(draws), kept.dealt(shared_by)):
+            own = draw > 0 or shared_by > 0
+            shown = measure_pictures(scene.views, disturbed, rng) if own else measured
+            grasps = add_clouds(part, shown[number], shown, config, rng)
             batches.append((origin, replace(grasps, object_index=index_of_body[grasps.body_id])))
     return batches
 
@@ -109,6 +111,11 @@ def label_scene(
 def noise_draws(split: str, config: RunConfig) -> int:
     """Clouds that are measured of each grasp in a scene of this split."""
     return config.grasps.noise_draws if split == "train" else 1
+
+
+def noise_shared_by(split: str, config: RunConfig) -> int:
+    """Grasps of one view in a scene of this split that share a draw of noise; 0: all."""
+    return config.grasps.noise_shared_by if split == "train" else 0
 
 
 def visible_surface(view: CameraView, surfaces: Surfaces, radius_m: float) -> VisibleSurface:

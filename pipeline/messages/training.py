@@ -75,6 +75,9 @@ def fine_tuning_of(message: TrainingResult) -> FineTuning | None:
         released_before=told.released_before,
         released_after=told.released_after,
         released_grasps=told.released_grasps,
+        learnt_before=told.learnt_before if told.HasField("learnt_before") else None,
+        learnt_after=told.learnt_after if told.HasField("learnt_after") else None,
+        learnt_grasps=told.learnt_grasps,
     )
 
 

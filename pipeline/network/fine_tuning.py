@@ -1,6 +1,7 @@
 """Training that begins from a trained network: what it gains on new samples, and what it forgets.
 
-Forgetting is told on the released network's own test grasps, some of which lie beside it.
+Forgetting is told on grasps of the released network that lie beside it: on some that it was trained
+on, which is what it can forget, and on some of its test.
 """
 
 from dataclasses import dataclass
@@ -21,7 +22,11 @@ from pipeline.network.checkpoint import (
 from pipeline.network.figures import mean_absolute_error
 from pipeline.network.ga_cnn import GaCnn
 from pipeline.network.inference import predict
-from pipeline.network.released_files import RELEASED_FOLDER, TEST_GRASPS_FILE
+from pipeline.network.released_files import (
+    RELEASED_FOLDER,
+    TEST_GRASPS_FILE,
+    TRAIN_GRASPS_FILE,
+)
 from pipeline.network.samples import GraspTensors
 
 _FORMAT = "softgrip.grasps"
@@ -43,6 +48,12 @@ class FineTuning:
         Of the trained one, on the same.
     released_grasps
         How many these are.
+    learnt_before
+        Of the first, on grasps that the released network was trained on; None in older files.
+    learnt_after
+        Of the trained one, on the same; None in older files.
+    learnt_grasps
+        How many these are.
     """
 
     own_before: float
@@ -50,6 +61,9 @@ class FineTuning:
     released_before: float
     released_after: float
     released_grasps: int
+    learnt_before: float | None = None
+    learnt_after: float | None = None
+    learnt_grasps: int = 0
 
     def headline(self) -> dict[str, Any]:
         """The figures by the names that a stage's summary gives them."""
@@ -104,6 +118,7 @@ def measure_fine_tuning(
     config: TrainConfig,
     own: GraspTensors,
     released: GraspTensors | None = None,
+    learnt: GraspTensors | None = None,
 ) -> FineTuning:
     """Errors of both networks on new test grasps and on those of the released network.
 
@@ -119,6 +134,8 @@ def measure_fine_tuning(
         The run's test split.
     released
         Test grasps of the released network; None: those that lie beside it.
+    learnt
+        Grasps that the released network was trained on; None: those that lie beside it.
 
     Returns
     -------
@@ -127,11 +144,10 @@ def measure_fine_tuning(
     Raises
     ------
     ArtifactError
-        The file beside the released network is damaged.
+        A file beside the released network is damaged.
     """
-    if released is None:
-        path = RELEASED_FOLDER / TEST_GRASPS_FILE
-        released = grasps_from_bytes(path.read_bytes(), str(path))
+    released = _beside_the_released(TEST_GRASPS_FILE) if released is None else released
+    learnt = _beside_the_released(TRAIN_GRASPS_FILE) if learnt is None else learnt
 
     def error(network: GaCnn, grasps: GraspTensors) -> float:
         predicted = predict(
@@ -147,7 +163,15 @@ def measure_fine_tuning(
         released_before=error(start, released),
         released_after=error(trained, released),
         released_grasps=len(released),
+        learnt_before=error(start, learnt),
+        learnt_after=error(trained, learnt),
+        learnt_grasps=len(learnt),
     )
+
+
+def _beside_the_released(name: str) -> GraspTensors:
+    path = RELEASED_FOLDER / name
+    return grasps_from_bytes(path.read_bytes(), str(path))
 
 
 def grasps_to_bytes(

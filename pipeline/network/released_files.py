@@ -7,4 +7,5 @@ RELEASED_FOLDER = Path(__file__).parent / "released"
 EXPORT_FILE = "ga_cnn.onnx"  # what control runs
 CHECKPOINT_FILE = "ga_cnn.safetensors"  # what a training begins with
 TEST_GRASPS_FILE = "test_grasps.safetensors"  # some of its own test grasps
+TRAIN_GRASPS_FILE = "train_grasps.safetensors"  # some of those that it was trained on
 BASELINE_FILE, FIGURES_FILE, DIGESTS_FILE = "analytic.json", "figures.json", "digests.json"

@@ -154,6 +154,9 @@ def tuning_table(tuned: FineTuning) -> str:
             tuned.released_after,
         ),
     ]
+    if tuned.learnt_before is not None and tuned.learnt_after is not None:
+        name = f"{tuned.learnt_grasps} grasps that the released network was trained on"
+        rows.append((name, tuned.learnt_before, tuned.learnt_after))
     lines = "\n".join(f"| {name} | {was:.4f} | {now:.4f} |" for name, was, now in rows)
     return f"| mean &#124;q-hat - q&#124;, one prediction | before | after |\n|-|-|-|\n{lines}\n"
 

@@ -21,10 +21,11 @@ WIDTH_PX, HEIGHT_PX = 128, 96
 
 
 @lru_cache
-def labelled(split: str, draws: int) -> list[LabelledGrasps]:
+def labelled(split: str, draws: int, shared_by: int = 0) -> list[LabelledGrasps]:
     """Grasps of a ball that one camera sees, batch by batch."""
+    drawn = {"noise_draws": draws, "noise_shared_by": shared_by}
     config = RunConfig.model_validate(
-        {"grasps": {"merged_share": 0.0, "noise_draws": draws, "oversampling": 1.0}}
+        {"grasps": {"merged_share": 0.0, "oversampling": 1.0, **drawn}}
     )
     ball = mesh_of(trimesh.creation.icosphere(subdivisions=3, radius=0.045))
     placed = PlacedObject("ball", 1, frame_from_z(np.array([0, 0, 0.045]), np.array([0, 0, 1.0])))
@@ -64,3 +65,21 @@ def test_the_first_clouds_are_those_without_further_ones() -> None:
 
 def test_a_test_grasp_has_one_cloud() -> None:
     assert len(labelled("test", DRAWS)) == 1
+
+
+def test_each_part_of_a_views_grasps_has_noise_of_its_own() -> None:
+    whole, parts = labelled("train", 1)[0], labelled("train", 1, shared_by=8)
+    assert [len(part.quality) for part in parts] == [8, 8, 7, 7]
+    for index, part in enumerate(parts):
+        rows = slice(index, None, len(parts))
+        np.testing.assert_array_equal(part.world_from_gripper, whole.world_from_gripper[rows])
+        np.testing.assert_array_equal(part.quality, whole.quality[rows])
+        both = part.cloud_mask & whole.cloud_mask[rows]
+        # The same contacts under noise of another picture.
+        assert 0.02 < np.abs(part.cloud[both] - whole.cloud[rows][both]).std() < 0.3
+    assert len(labelled("train", 2, shared_by=8)) == 2 * len(parts)
+
+
+def test_test_grasps_share_the_noise_of_their_picture() -> None:
+    whole, same = labelled("test", 1), labelled("test", 1, shared_by=8)
+    np.testing.assert_array_equal(whole[0].cloud, same[0].cloud)

@@ -53,10 +53,14 @@ def test_it_gains_on_its_own_samples_and_forgets_what_it_no_longer_sees(
 ) -> None:
     own, own_test = contrary(600, seed=3), contrary(200, seed=4)
     tuned = train(CONFIG, NETWORK, 1, own, own_test, tmp_path, ignored, start=start).network
-    told = measure_fine_tuning(start, tuned, CONFIG, own_test, known)
+    learnt = planes_with_holes(100, seed=2)
+    told = measure_fine_tuning(start, tuned, CONFIG, own_test, known, learnt)
     assert told.own_after < told.own_before - 0.05
     assert told.released_after > told.released_before + 0.05
-    assert told.released_grasps == 200
+    assert told.learnt_before is not None
+    assert told.learnt_after is not None
+    assert told.learnt_after > told.learnt_before + 0.05
+    assert (told.released_grasps, told.learnt_grasps) == (200, 100)
 
 
 def test_a_short_training_from_a_network_is_ahead_of_one_from_the_seed(

@@ -107,18 +107,24 @@ class TrainingResult(_message.Message):
     def __init__(self, layers: _Optional[int] = ..., channels: _Optional[_Iterable[int]] = ..., parameters: _Optional[int] = ..., best_epoch: _Optional[int] = ..., test_mae: _Optional[float] = ..., mean_predictor_mae: _Optional[float] = ..., baseline_mae: _Optional[_Mapping[str, float]] = ..., test_mae_by_class: _Optional[_Mapping[str, float]] = ..., test_mae_by_tenth: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., calibration: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., test_quality: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., test_prediction: _Optional[_Union[_tensor_pb2.Tensor, _Mapping]] = ..., val_mae: _Optional[float] = ..., test_mae_single: _Optional[float] = ..., test_count_by_class: _Optional[_Mapping[str, int]] = ..., train_count: _Optional[int] = ..., val_count: _Optional[int] = ..., test_mae_as_proposed: _Optional[float] = ..., mean_predictor_mae_as_proposed: _Optional[float] = ..., baseline_mae_as_proposed: _Optional[_Mapping[str, float]] = ..., test_mae_by_pictures: _Optional[_Mapping[str, float]] = ..., fine_tuning: _Optional[_Union[FineTuning, _Mapping]] = ...) -> None: ...
 
 class FineTuning(_message.Message):
-    __slots__ = ("own_before", "own_after", "released_before", "released_after", "released_grasps")
+    __slots__ = ("own_before", "own_after", "released_before", "released_after", "released_grasps", "learnt_before", "learnt_after", "learnt_grasps")
     OWN_BEFORE_FIELD_NUMBER: _ClassVar[int]
     OWN_AFTER_FIELD_NUMBER: _ClassVar[int]
     RELEASED_BEFORE_FIELD_NUMBER: _ClassVar[int]
     RELEASED_AFTER_FIELD_NUMBER: _ClassVar[int]
     RELEASED_GRASPS_FIELD_NUMBER: _ClassVar[int]
+    LEARNT_BEFORE_FIELD_NUMBER: _ClassVar[int]
+    LEARNT_AFTER_FIELD_NUMBER: _ClassVar[int]
+    LEARNT_GRASPS_FIELD_NUMBER: _ClassVar[int]
     own_before: float
     own_after: float
     released_before: float
     released_after: float
     released_grasps: int
-    def __init__(self, own_before: _Optional[float] = ..., own_after: _Optional[float] = ..., released_before: _Optional[float] = ..., released_after: _Optional[float] = ..., released_grasps: _Optional[int] = ...) -> None: ...
+    learnt_before: float
+    learnt_after: float
+    learnt_grasps: int
+    def __init__(self, own_before: _Optional[float] = ..., own_after: _Optional[float] = ..., released_before: _Optional[float] = ..., released_after: _Optional[float] = ..., released_grasps: _Optional[int] = ..., learnt_before: _Optional[float] = ..., learnt_after: _Optional[float] = ..., learnt_grasps: _Optional[int] = ...) -> None: ...
 
 class SweepNetwork(_message.Message):
     __slots__ = ("group", "variant", "layers", "channels", "seed", "parameters", "multiply_adds", "val_mae", "val_mae_spread", "test_mae", "test_mae_single", "test_mae_averaged", "test_mae_by_class", "best_epoch", "curve", "chosen", "of_run")
