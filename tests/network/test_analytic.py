@@ -115,7 +115,7 @@ def test_what_was_released_tells_a_flat_cloud_from_a_step(named: str) -> None:
     cloud, mask = cloud_of(np.stack([np.zeros((CELLS, CELLS)), step]))
     flat, stepped = quality_source(named, GRIPPER, threads=1).predict(cloud, mask)
     assert flat > 0.7
-    # The pad bridges part of a smoothed step, and the baseline then says the mean q of all clouds on
-    # which it does (0.30): what it holds is the distance to a flat cloud. The network says less.
+    # The pad bridges part of a smoothed step, and the baseline then says the mean q of all clouds
+    # on which it does (0.30): what is held is the distance to a flat one. The network says less.
     assert stepped < flat - 0.5
     assert stepped < 0.3 or named == "analytic"
