@@ -349,12 +349,17 @@ def _conclude_into(
         summary[row, 0] = least
         summary[row, 1] = greatest
         summary[row, 2] = np.sqrt(squares / n)
+        # Four sums side by side: each adds in the order of the triangles, none waits for another.
+        x = y = z = turn = 0.0
+        for j in range(n):
+            x += matrices[row, 0, j] * w[j]
+            y += matrices[row, 1, j] * w[j]
+            z += matrices[row, 2, j] * w[j]
+            turn += matrices[row, 3, j] * w[j]
+        wrench[row, 0], wrench[row, 1], wrench[row, 2], wrench[row, 3] = x, y, z, turn
         distance = 0.0
         for r in range(4):
-            value = 0.0
-            for j in range(n):
-                value += matrices[row, r, j] * w[j]
-            wrench[row, r] = value
+            value = wrench[row, r]
             slacks[row, r] = forces[row] * upper[r] - value
             slacks[row, 4 + r] = value - forces[row] * lower[r]
             distance += (value - target[r]) ** 2

@@ -54,7 +54,7 @@ FEASIBILITY_TOLERANCE = 1e-9
 RESIDUAL_TOLERANCE = 2e-8
 # Below this |s(GW - Lambda)| the gap is held to an absolute bound: r within 2e-7.
 CORNER = 1e-6
-_WORK_ARRAYS = 9
+_WORK_ARRAYS = 12
 
 
 def solve(problem: QualityProblem) -> QpSolution:
@@ -150,7 +150,8 @@ def _interior_point(
     # Slices of exactly n elements let the loops below run without bounds on strides.
     v, z_l, z_u = work[0, :n], work[1, :n], work[2, :n]
     h, d_inv, rho, dv = work[3, :n], work[4, :n], work[5, :n], work[6, :n]
-    p_l, p_u = work[7, :n], work[8, :n]
+    p_l, p_u, i_l, i_u = work[7, :n], work[8, :n], work[9, :n], work[10, :n]
+    most = work[11, :n]
     m_0, m_1, m_2, m_3 = rows[0, :n], rows[1, :n], rows[2, :n], rows[3, :n]
     t0 = np.empty(4)
     bounded = np.empty(4, dtype=np.bool_)
@@ -182,6 +183,8 @@ def _interior_point(
         v[j] = 0.0
         z_l[j] = max(h[j], 0.0) + shift
         z_u[j] = max(-h[j], 0.0) + shift
+        # The first move is of length 0.
+        dv[j] = p_l[j] = p_u[j] = i_l[j] = i_u[j] = 0.0
     for r in range(4):
         if bounded[r]:
             w_l[r] = 0.05
@@ -195,27 +198,12 @@ def _interior_point(
     theta = np.empty(4)
     c_l = np.zeros(4)
     c_u = np.zeros(4)
+    alpha = 0.0
     for iteration in range(max_iterations + 1):
-        # Residuals and the duality gap at this point.
-        gap = 0.0
-        dual = 0.0
-        reach = 0.0
-        s_v = 0.0
-        p_0 = 0.0
-        p_1 = 0.0
-        p_2 = 0.0
-        p_3 = 0.0
-        for j in range(n):
-            hj = pi[0] * m_0[j] + pi[1] * m_1[j] + pi[2] * m_2[j] + pi[3] * m_3[j] + nu
-            h[j] = hj
-            gap += z_l[j] * (1.0 + v[j]) + z_u[j] * (1.0 - v[j])
-            dual += abs(hj - z_l[j] + z_u[j])
-            reach += abs(hj)
-            s_v += v[j]
-            p_0 += m_0[j] * v[j]
-            p_1 += m_1[j] * v[j]
-            p_2 += m_2[j] * v[j]
-            p_3 += m_3[j] * v[j]
+        # Move; residuals and the duality gap at this point.
+        gap, dual, reach, s_v, p_0, p_1, p_2, p_3 = _move(
+            m_0, m_1, m_2, m_3, pi, nu, alpha, dv, p_l, p_u, v, z_l, z_u, i_l, i_u, h
+        )
         r_p = (t[0] - t0[0] - p_0, t[1] - t0[1] - p_1, t[2] - t0[2] - p_2, t[3] - t0[3] - p_3)
         products = 2.0 * n
         residual = 0.0
@@ -246,7 +234,7 @@ def _interior_point(
         mu = gap / products
 
         # The 5 x 5 system, and the predictor's right side.
-        _form(m_0, m_1, m_2, m_3, v, z_l, z_u, d_inv, system)
+        _form(m_0, m_1, m_2, m_3, z_l, z_u, i_l, i_u, h, d_inv, system, right)
         for r in range(4):
             e = k * k
             if bounded[r]:
@@ -254,16 +242,31 @@ def _interior_point(
             e_inv[r] = 1.0 / e
             system[r, r] += e_inv[r]
         _factor(system)
-        for j in range(n):
-            rho[j] = -h[j]
         sigma_mu = 0.0
         for r in range(4):
             c_l[r] = 0.0
             c_u[r] = 0.0
         worst = 0.0
-        alpha = 1.0
         for corrector in range(2):
-            _project(m_0, m_1, m_2, m_3, d_inv, rho, right)
+            if corrector == 1:
+                _correct(
+                    m_0,
+                    m_1,
+                    m_2,
+                    m_3,
+                    z_l,
+                    z_u,
+                    i_l,
+                    i_u,
+                    h,
+                    d_inv,
+                    dv,
+                    sigma_mu,
+                    p_l,
+                    p_u,
+                    rho,
+                    right,
+                )
             for r in range(4):
                 theta[r] = pi[r] - k * (k * t[r] - scale * target[r])
                 if bounded[r]:
@@ -272,11 +275,15 @@ def _interior_point(
                 right[r] -= theta[r] * e_inv[r] + r_p[r]
             right[4] += s_v
             _substitute(system, right, step)
-            _step_v(m_0, m_1, m_2, m_3, d_inv, rho, step, dv)
+            ahead = 0.0
             if corrector == 0:
-                worst = _blocking_predictor(v, dv)
+                worst, ahead = _predict(
+                    m_0, m_1, m_2, m_3, z_l, z_u, i_l, i_u, h, d_inv, step, dv, most
+                )
             else:
-                worst = _blocking_corrector(v, z_l, z_u, p_l, p_u, dv)
+                worst = _step(
+                    m_0, m_1, m_2, m_3, z_l, z_u, i_l, i_u, p_l, p_u, rho, d_inv, step, dv, most
+                )
             for r in range(4):
                 dt[r] = (theta[r] + step[r]) * e_inv[r]
                 if bounded[r]:
@@ -289,25 +296,16 @@ def _interior_point(
                     if corrector == 0:
                         c_l[r] = dt[r] * dw_l
                         c_u[r] = -dt[r] * dw_u
+                        ahead += c_l[r] + c_u[r]
             if corrector == 0:
+                # Each product of slack and multiplier goes from s z to (1 - a) s z + a^2 ds dz.
                 alpha = 1.0 / max(worst, 1.0)
-                ahead = _gap_ahead(v, z_l, z_u, dv, alpha)
-                for r in range(4):
-                    if bounded[r]:
-                        s_l = t[r] - lower[r]
-                        s_u = upper[r] - t[r]
-                        dw_l = -w_l[r] * dt[r] / s_l - w_l[r]
-                        dw_u = w_u[r] * dt[r] / s_u - w_u[r]
-                        ahead += (w_l[r] + alpha * dw_l) * (s_l + alpha * dt[r])
-                        ahead += (w_u[r] + alpha * dw_u) * (s_u - alpha * dt[r])
-                ratio = max(ahead, 0.0) / gap
+                ratio = max((1.0 - alpha) * gap + alpha * alpha * ahead, 0.0) / gap
                 sigma_mu = mu * ratio * ratio * ratio
-                _correct(v, z_l, z_u, h, dv, sigma_mu, p_l, p_u, rho)
             else:
                 alpha = min(1.0, 0.995 / max(worst, 1e-300))
 
-        # Move.
-        _advance(v, z_l, z_u, p_l, p_u, dv, alpha)
+        # Move what is not of a triangle.
         nu += alpha * step[4]
         for r in range(4):
             if bounded[r]:
@@ -353,28 +351,80 @@ def _centre_row(
 
 
 @compiled_finite
+def _move(
+    m_0: Float[np.ndarray, " n"],
+    m_1: Float[np.ndarray, " n"],
+    m_2: Float[np.ndarray, " n"],
+    m_3: Float[np.ndarray, " n"],
+    pi: Float[np.ndarray, " 4"],
+    nu: float,
+    alpha: float,
+    dv: Float[np.ndarray, " n"],
+    p_l: Float[np.ndarray, " n"],
+    p_u: Float[np.ndarray, " n"],
+    v: Float[np.ndarray, " n"],
+    z_l: Float[np.ndarray, " n"],
+    z_u: Float[np.ndarray, " n"],
+    i_l: Float[np.ndarray, " n"],
+    i_u: Float[np.ndarray, " n"],
+    h: Float[np.ndarray, " n"],
+) -> tuple[float, float, float, float, float, float, float, float]:
+    """A step of length alpha; then h = M'pi + nu 1 and the inverses of the slacks there.
+
+    Returns the sum of z times slack, the sum of |h - z_l + z_u|, that of |h|, 1'v and M v.
+    """
+    e_0, e_1, e_2, e_3 = pi[0], pi[1], pi[2], pi[3]
+    gap = dual = reach = s_v = p_0 = p_1 = p_2 = p_3 = 0.0
+    for j in range(v.size):
+        z_lj = z_l[j] + alpha * (p_l[j] - z_l[j] - z_l[j] * dv[j] * i_l[j])
+        z_uj = z_u[j] + alpha * (p_u[j] - z_u[j] + z_u[j] * dv[j] * i_u[j])
+        vj = v[j] + alpha * dv[j]
+        hj = e_0 * m_0[j] + e_1 * m_1[j] + e_2 * m_2[j] + e_3 * m_3[j] + nu
+        a_l = 1.0 + vj
+        a_u = 1.0 - vj
+        inverse = 1.0 / (a_l * a_u)
+        z_l[j] = z_lj
+        z_u[j] = z_uj
+        v[j] = vj
+        h[j] = hj
+        i_l[j] = a_u * inverse
+        i_u[j] = a_l * inverse
+        gap += z_lj * a_l + z_uj * a_u
+        dual += abs(hj - z_lj + z_uj)
+        reach += abs(hj)
+        s_v += vj
+        p_0 += m_0[j] * vj
+        p_1 += m_1[j] * vj
+        p_2 += m_2[j] * vj
+        p_3 += m_3[j] * vj
+    return gap, dual, reach, s_v, p_0, p_1, p_2, p_3
+
+
+@compiled_finite
 def _form(
     m_0: Float[np.ndarray, " n"],
     m_1: Float[np.ndarray, " n"],
     m_2: Float[np.ndarray, " n"],
     m_3: Float[np.ndarray, " n"],
-    v: Float[np.ndarray, " n"],
     z_l: Float[np.ndarray, " n"],
     z_u: Float[np.ndarray, " n"],
+    i_l: Float[np.ndarray, " n"],
+    i_u: Float[np.ndarray, " n"],
+    h: Float[np.ndarray, " n"],
     d_inv: Float[np.ndarray, " n"],
     system: Float[np.ndarray, "5 5"],
+    right: Float[np.ndarray, " 5"],
 ) -> None:
-    """D^-1 and the lower triangle of [M; 1'] D^-1 [M; 1']'."""
-    for j in range(v.size):
-        a_l = 1.0 + v[j]
-        a_u = 1.0 - v[j]
-        # The floor keeps D invertible where a weight is all but free; it damps the
-        # step a little and leaves the point the iterations end at unchanged.
-        d_inv[j] = a_l * a_u / (z_l[j] * a_u + z_u[j] * a_l + 1e-14 * a_l * a_u)
+    """D^-1, the lower triangle of [M; 1'] D^-1 [M; 1']', and [M; 1'] D^-1 (-h)."""
     s_00 = s_10 = s_11 = s_20 = s_21 = s_22 = 0.0
     s_30 = s_31 = s_32 = s_33 = s_40 = s_41 = s_42 = s_43 = s_44 = 0.0
-    for j in range(v.size):
-        d = d_inv[j]
+    r_0 = r_1 = r_2 = r_3 = r_4 = 0.0
+    for j in range(h.size):
+        # The floor keeps D invertible where a weight is all but free; it damps the
+        # step a little and leaves the point the iterations end at unchanged.
+        d = 1.0 / (z_l[j] * i_l[j] + z_u[j] * i_u[j] + 1e-14)
+        d_inv[j] = d
+        x = d * h[j]
         d_0 = d * m_0[j]
         d_1 = d * m_1[j]
         d_2 = d * m_2[j]
@@ -394,12 +444,18 @@ def _form(
         s_33 += d_3 * m_3[j]
         s_43 += d_3
         s_44 += d
+        r_0 -= x * m_0[j]
+        r_1 -= x * m_1[j]
+        r_2 -= x * m_2[j]
+        r_3 -= x * m_3[j]
+        r_4 -= x
     system[0, 0] = s_00
     system[1, 0], system[1, 1] = s_10, s_11
     system[2, 0], system[2, 1], system[2, 2] = s_20, s_21, s_22
     system[3, 0], system[3, 1], system[3, 2], system[3, 3] = s_30, s_31, s_32, s_33
     system[4, 0], system[4, 1], system[4, 2] = s_40, s_41, s_42
     system[4, 3], system[4, 4] = s_43, s_44
+    right[0], right[1], right[2], right[3], right[4] = r_0, r_1, r_2, r_3, r_4
 
 
 @compiled_finite
@@ -436,19 +492,69 @@ def _substitute(
 
 
 @compiled_finite
-def _project(
+def _predict(
     m_0: Float[np.ndarray, " n"],
     m_1: Float[np.ndarray, " n"],
     m_2: Float[np.ndarray, " n"],
     m_3: Float[np.ndarray, " n"],
+    z_l: Float[np.ndarray, " n"],
+    z_u: Float[np.ndarray, " n"],
+    i_l: Float[np.ndarray, " n"],
+    i_u: Float[np.ndarray, " n"],
+    h: Float[np.ndarray, " n"],
     d_inv: Float[np.ndarray, " n"],
+    step: Float[np.ndarray, " 5"],
+    dv: Float[np.ndarray, " n"],
+    most: Float[np.ndarray, " n"],
+) -> tuple[float, float]:
+    """dv = (-h - M'dpi - 1 dnu) / D, without centring.
+
+    Returns 1 over the step at which a bound or its multiplier reaches 0 (dz_l / z_l is
+    -1 - dv / (1 + v), and likewise above), and the sum of the products of both changes.
+    """
+    e_0, e_1, e_2, e_3, e_4 = step[0], step[1], step[2], step[3], step[4]
+    ahead = 0.0
+    for j in range(h.size):
+        along = e_0 * m_0[j] + e_1 * m_1[j] + e_2 * m_2[j] + e_3 * m_3[j] + e_4
+        change = -d_inv[j] * (h[j] + along)
+        dv[j] = change
+        below = change * i_l[j]
+        above = change * i_u[j]
+        most[j] = max(max(-below, above), max(1.0 + below, 1.0 - above))
+        ahead += change * (z_u[j] * (1.0 - above) - z_l[j] * (1.0 + below))
+    return max(_greatest(most), 0.0), ahead
+
+
+@compiled_finite
+def _correct(
+    m_0: Float[np.ndarray, " n"],
+    m_1: Float[np.ndarray, " n"],
+    m_2: Float[np.ndarray, " n"],
+    m_3: Float[np.ndarray, " n"],
+    z_l: Float[np.ndarray, " n"],
+    z_u: Float[np.ndarray, " n"],
+    i_l: Float[np.ndarray, " n"],
+    i_u: Float[np.ndarray, " n"],
+    h: Float[np.ndarray, " n"],
+    d_inv: Float[np.ndarray, " n"],
+    dv: Float[np.ndarray, " n"],
+    sigma_mu: float,
+    p_l: Float[np.ndarray, " n"],
+    p_u: Float[np.ndarray, " n"],
     rho: Float[np.ndarray, " n"],
     right: Float[np.ndarray, " 5"],
 ) -> None:
-    """[M; 1'] D^-1 rho."""
+    """p = (sigma mu - second-order term of the predictor) / slack, rho, and [M; 1'] D^-1 rho."""
     r_0 = r_1 = r_2 = r_3 = r_4 = 0.0
-    for j in range(rho.size):
-        x = d_inv[j] * rho[j]
+    for j in range(h.size):
+        change = dv[j]
+        below = (sigma_mu + change * z_l[j] * (1.0 + change * i_l[j])) * i_l[j]
+        above = (sigma_mu - change * z_u[j] * (1.0 - change * i_u[j])) * i_u[j]
+        p_l[j] = below
+        p_u[j] = above
+        rest = below - above - h[j]
+        rho[j] = rest
+        x = d_inv[j] * rest
         r_0 += m_0[j] * x
         r_1 += m_1[j] * x
         r_2 += m_2[j] * x
@@ -458,110 +564,51 @@ def _project(
 
 
 @compiled_finite
-def _step_v(
+def _step(
     m_0: Float[np.ndarray, " n"],
     m_1: Float[np.ndarray, " n"],
     m_2: Float[np.ndarray, " n"],
     m_3: Float[np.ndarray, " n"],
-    d_inv: Float[np.ndarray, " n"],
+    z_l: Float[np.ndarray, " n"],
+    z_u: Float[np.ndarray, " n"],
+    i_l: Float[np.ndarray, " n"],
+    i_u: Float[np.ndarray, " n"],
+    p_l: Float[np.ndarray, " n"],
+    p_u: Float[np.ndarray, " n"],
     rho: Float[np.ndarray, " n"],
+    d_inv: Float[np.ndarray, " n"],
     step: Float[np.ndarray, " 5"],
     dv: Float[np.ndarray, " n"],
-) -> None:
-    """dv = (rho - M'dpi - 1 dnu) / D."""
+    most: Float[np.ndarray, " n"],
+) -> float:
+    """dv = (rho - M'dpi - 1 dnu) / D, and 1 over the step at which anything reaches 0.
+
+    dz_l = p_l - z_l - z_l dv / (1 + v), and likewise above.
+    """
     e_0, e_1, e_2, e_3, e_4 = step[0], step[1], step[2], step[3], step[4]
     for j in range(rho.size):
         along = e_0 * m_0[j] + e_1 * m_1[j] + e_2 * m_2[j] + e_3 * m_3[j] + e_4
-        dv[j] = d_inv[j] * (rho[j] - along)
-
-
-@compiled_finite
-def _blocking_predictor(v: Float[np.ndarray, " n"], dv: Float[np.ndarray, " n"]) -> float:
-    """1 over the step at which a bound or its multiplier reaches 0, without centring.
-
-    Then dz_l / z_l = -1 - dv / (1 + v), and likewise above.
-    """
-    worst = 0.0
-    for j in range(v.size):
-        below = dv[j] / (1.0 + v[j])
-        above = dv[j] / (1.0 - v[j])
-        worst = max(worst, max(max(-below, above), max(1.0 + below, 1.0 - above)))
-    return worst
-
-
-@compiled_finite
-def _blocking_corrector(
-    v: Float[np.ndarray, " n"],
-    z_l: Float[np.ndarray, " n"],
-    z_u: Float[np.ndarray, " n"],
-    p_l: Float[np.ndarray, " n"],
-    p_u: Float[np.ndarray, " n"],
-    dv: Float[np.ndarray, " n"],
-) -> float:
-    """As `_blocking_predictor`, with dz_l = p_l - z_l - z_l dv / (1 + v)."""
-    worst = 0.0
-    for j in range(v.size):
-        below = dv[j] / (1.0 + v[j])
-        above = dv[j] / (1.0 - v[j])
+        change = d_inv[j] * (rho[j] - along)
+        dv[j] = change
+        below = change * i_l[j]
+        above = change * i_u[j]
         fall_l = 1.0 + below - p_l[j] / z_l[j]
         fall_u = 1.0 - above - p_u[j] / z_u[j]
-        worst = max(worst, max(max(-below, above), max(fall_l, fall_u)))
-    return worst
+        most[j] = max(max(-below, above), max(fall_l, fall_u))
+    return max(_greatest(most), 0.0)
 
 
 @compiled_finite
-def _gap_ahead(
-    v: Float[np.ndarray, " n"],
-    z_l: Float[np.ndarray, " n"],
-    z_u: Float[np.ndarray, " n"],
-    dv: Float[np.ndarray, " n"],
-    alpha: float,
-) -> float:
-    """Sum of z times slack after a predictor step of length alpha."""
-    total = 0.0
-    for j in range(v.size):
-        a_l = 1.0 + v[j]
-        a_u = 1.0 - v[j]
-        ahead_l = z_l[j] - alpha * z_l[j] * (1.0 + dv[j] / a_l)
-        ahead_u = z_u[j] - alpha * z_u[j] * (1.0 - dv[j] / a_u)
-        total += ahead_l * (a_l + alpha * dv[j]) + ahead_u * (a_u - alpha * dv[j])
-    return total
+def _greatest(values: Float[np.ndarray, " n"]) -> float:
+    """Greatest of the values, which are overwritten: halves against each other, in SIMD lanes.
 
-
-@compiled_finite
-def _correct(
-    v: Float[np.ndarray, " n"],
-    z_l: Float[np.ndarray, " n"],
-    z_u: Float[np.ndarray, " n"],
-    h: Float[np.ndarray, " n"],
-    dv: Float[np.ndarray, " n"],
-    sigma_mu: float,
-    p_l: Float[np.ndarray, " n"],
-    p_u: Float[np.ndarray, " n"],
-    rho: Float[np.ndarray, " n"],
-) -> None:
-    """p = (sigma mu - second-order term of the predictor) / slack, and rho with it."""
-    for j in range(v.size):
-        a_l = 1.0 + v[j]
-        a_u = 1.0 - v[j]
-        second_l = -dv[j] * z_l[j] * (1.0 + dv[j] / a_l)
-        second_u = dv[j] * z_u[j] * (1.0 - dv[j] / a_u)
-        p_l[j] = (sigma_mu - second_l) / a_l
-        p_u[j] = (sigma_mu - second_u) / a_u
-        rho[j] = p_l[j] - p_u[j] - h[j]
-
-
-@compiled_finite
-def _advance(
-    v: Float[np.ndarray, " n"],
-    z_l: Float[np.ndarray, " n"],
-    z_u: Float[np.ndarray, " n"],
-    p_l: Float[np.ndarray, " n"],
-    p_u: Float[np.ndarray, " n"],
-    dv: Float[np.ndarray, " n"],
-    alpha: float,
-) -> None:
-    for j in range(v.size):
-        z_l[j] += alpha * (p_l[j] - z_l[j] - z_l[j] * dv[j] / (1.0 + v[j]))
-        z_u[j] += alpha * (p_u[j] - z_u[j] + z_u[j] * dv[j] / (1.0 - v[j]))
-        v[j] += alpha * dv[j]
+    The compiler does not vectorise a running maximum.
+    """
+    count = values.size
+    while count > 1:
+        half = count // 2
+        left, right = values[:half], values[count - half : count]
+        for j in range(half):
+            left[j] = max(left[j], right[j])
+        count -= half
+    return values[0]
