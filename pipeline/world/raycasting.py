@@ -167,13 +167,13 @@ class RayScene:
             np.broadcast_to(np.asarray(directions, dtype=np.float64), origins.shape)
         )
         lengths = np.sqrt(np.einsum("ij,ij->i", rays, rays))
-        if not (np.isfinite(origins).all() and np.isfinite(lengths).all() and lengths.all()):
+        rays, near, along, sound = _prepared(origins, rays, lengths, self._centre, self._scale)
+        if not sound:
             raise ValueError("rays need finite origins and finite directions of length above zero")
-        rays = rays / lengths[:, None]
         if len(origins) == 0:
             nothing = np.empty(0, dtype=np.int64)
             return RayHits(np.empty(0), nothing, nothing)
-        face = self._first_faces(origins, rays)
+        face = self._first_faces(near, along)
         distance, from_inside = _plane_distances(self._corners, face, origins, rays)
         # About one in a thousand of the rays aimed exactly at an edge passes through it and hits
         # the far wall from inside. Rays that start inside a body are cast again too, and keep
@@ -181,25 +181,62 @@ class RayScene:
         again = np.flatnonzero(from_inside)
         if len(again):
             aside = np.array([0.6, -0.48, 0.64]) * (_ASIDE * _EMBREE_EXTENT / self._scale)
-            second = self._first_faces(origins[again] + aside, rays[again])
+            moved = ((origins[again] + aside - self._centre) * self._scale).astype(np.float32)
+            second = self._first_faces(moved, along[again])
             nearer, _ = _plane_distances(self._corners, second, origins[again], rays[again])
             better = nearer < distance[again]
             face[again[better]] = second[better]
             distance[again[better]] = nearer[better]
-        hit = face >= 0
-        body = np.where(hit, self._body_of_face[face], -1)
-        triangle = np.where(hit, face - self._first_face[body], -1)
-        return RayHits(distance, body, triangle)
+        return RayHits(distance, *_named(face, self._body_of_face, self._first_face))
 
     def _first_faces(
         self, origins: Float[np.ndarray, "n 3"], rays: Float[np.ndarray, "n 3"]
     ) -> Int[np.ndarray, " n"]:
-        """Face each unit ray hits first, bodies one after the other; -1 for none."""
+        """Face each unit ray hits first, bodies one after the other; -1 for none.
+
+        Both arrays are of single precision, in Embree's scaled frame.
+        """
         # Without `output`, Embree returns only the triangle, which is twice as fast.
-        face = self._embree.run(
-            ((origins - self._centre) * self._scale).astype(np.float32), rays.astype(np.float32)
-        )
-        return np.asarray(face, dtype=np.int64)
+        return np.asarray(self._embree.run(origins, rays), dtype=np.int64)
+
+
+@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+def _prepared(
+    origins: Float[np.ndarray, "n 3"],
+    rays: Float[np.ndarray, "n 3"],
+    lengths: Float[np.ndarray, " n"],
+    centre: Float[np.ndarray, " 3"],
+    scale: float,
+) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"], Float[np.ndarray, "n 3"], bool]:
+    """Unit rays; origins and rays for Embree, in single precision; and whether all are sound."""
+    unit = np.empty_like(rays)
+    near, along = np.empty(rays.shape, np.float32), np.empty(rays.shape, np.float32)
+    sound = True
+    for i in range(len(rays)):
+        # Infinite or NaN components make the length so too.
+        if not (np.isfinite(lengths[i]) and lengths[i] != 0.0):
+            return unit, near, along, False
+        for axis in range(3):
+            sound = sound and np.isfinite(origins[i, axis])
+            unit[i, axis] = rays[i, axis] / lengths[i]
+            near[i, axis] = np.float32((origins[i, axis] - centre[axis]) * scale)
+            along[i, axis] = np.float32(unit[i, axis])
+    return unit, near, along, sound
+
+
+@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+def _named(
+    face: Int[np.ndarray, " n"],
+    body_of_face: Int[np.ndarray, " m"],
+    first_face: Int[np.ndarray, " bodies"],
+) -> tuple[Int[np.ndarray, " n"], Int[np.ndarray, " n"]]:
+    """Body of each face, and the face's index within it; -1 of none."""
+    body, triangle = np.full(len(face), -1), np.full(len(face), -1)
+    for i in range(len(face)):
+        if face[i] >= 0:
+            body[i] = body_of_face[face[i]]
+            triangle[i] = face[i] - first_face[body[i]]
+    return body, triangle
 
 
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]
