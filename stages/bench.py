@@ -14,6 +14,7 @@ import numpy as np
 
 from pipeline.artifacts import publish_bytes
 from pipeline.benchmarks import clutter, control, inference, labelling, loading, solvers, storage
+from pipeline.benchmarks.commits import against_older
 from pipeline.benchmarks.cutting import cutting_time
 from pipeline.benchmarks.shuffling import shuffle_peaks
 from pipeline.config import RunConfig, load_run_config
@@ -82,8 +83,7 @@ def measure_all() -> None:
         figures |= (found := measure())
         sys.stdout.write(json.dumps(found, indent=1) + "\n")
         sys.stdout.flush()
-    peak_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    figures["peak_memory_mib"] = round(peak_kib / 1024)
+    figures["peak_memory_mib"] = round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
     path = bench.folder.path / "bench.json"
     publish_bytes(path, (json.dumps(figures, indent=1) + "\n").encode())
     sys.stdout.write(f"peak memory {figures['peak_memory_mib']} MiB; all of it in {path}\n")
@@ -155,7 +155,7 @@ def quadratic_programs(bench: Bench) -> dict[str, object]:
         problems += solvers.problems_under(
             pad, config.gripper, surfaces, candidates, config.grasps.clearance_m
         )
-    return solvers.figures(problems)
+    return solvers.figures(problems) | against_older(scene, bench.meshes, problems)
 
 
 def scaling(bench: Bench) -> dict[str, object]:
