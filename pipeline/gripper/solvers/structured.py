@@ -611,4 +611,4 @@ def _greatest(values: Float[np.ndarray, " n"]) -> float:
         for j in range(half):
             left[j] = max(left[j], right[j])
         count -= half
-    return values[0]
+    return values[0]  # type: ignore[no-any-return]
