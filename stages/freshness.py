@@ -69,6 +69,9 @@ def key(stage: str, run: RunName = "default", mesh_dir: MeshDir = None) -> None:
 def plan(goal: str, run: RunName = "default", mesh_dir: MeshDir = None) -> None:
     """Print what `make GOAL` will do, about how long it takes and how much disk."""
     folder = RunFolder(RUNS_DIR / run)
+    if is_sealed(folder):
+        sys.stdout.write(f"{folder.path} is sealed: nothing in it is made anew\n")
+        return
     lines = as_lines(planned(folder, mesh_dir, [goal]), free_disk_bytes(folder))
     sys.stdout.write("\n".join(lines) + "\n")
 

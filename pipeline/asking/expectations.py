@@ -92,7 +92,11 @@ def check_expectations(
     -------
     One finding for each expectation of that stage.
     """
-    expected = [one for one in (*declared_expectations(), *own) if one.stage in {stage, EVERY}]
+    expected = [
+        one.model_copy(update={"stage": stage})
+        for one in (*declared_expectations(), *own)
+        if one.stage in {stage, EVERY}
+    ]
     with open_tables(artifacts, cache_folder, stage) as tables:
         return [check(one, tables) for one in expected]
 
@@ -124,10 +128,11 @@ def outside(value: float, expected: Expectation) -> str:
 def as_markdown(found: Sequence[Found]) -> str:
     """A table of what was found, what does not hold first."""
     rows = sorted(found, key=lambda one: (not one.is_error, not one.problem))
-    lines = ["| expected | found | |", "|-|-|-|"]
+    lines = ["| stage | expected | found | |", "|-|-|-|-|"]
     for one in rows:
         value = "none" if one.value is None else f"{one.value:g}"
         verdict = f"**{one.expected.severity}**: {one.problem}" if one.problem else "holds"
         name = one.expected.name.replace("|", "\\|")
-        lines.append(f"| {name} | {value} | {verdict.replace('|', chr(92) + '|')} |")
+        told = verdict.replace("|", "\\|")
+        lines.append(f"| {one.expected.stage} | {name} | {value} | {told} |")
     return "\n".join(lines) + "\n"

@@ -22,7 +22,7 @@ from pipeline.artifacts.publishing import CANNOT_WRITE, remove_abandoned_scratch
 from pipeline.errors import SoftgripError
 from pipeline.execution.commands import EXIT_FAILURE, log_to
 from pipeline.execution.executors import Executor
-from pipeline.execution.sealing import refuse_sealed
+from pipeline.execution.sealing import is_sealed, refuse_sealed
 from pipeline.execution.stage import RunFolder, Stage, StageContext
 from pipeline.execution.staleness import (
     InputsOf,
@@ -84,6 +84,10 @@ def stage_command(
     ) -> None:
         folder = RunFolder(runs_dir / run)
         with _readable_failures(stage, folder, rank):
+            if is_sealed(folder) and folder.artifact(stage.name).is_file() and not force:
+                # Make calls the stages of a run that came without its bookkeeping.
+                logger.info("{}: {} is sealed, and stays as it is", stage.name, folder.path)
+                return
             # Of its own for each process: two would write one memo at once.
             memo = f"hashes.rank{rank}.json" if rank else MEMO
             context = stage_context(stage, folder, inputs_of, mesh_dir, workers, memo)

@@ -187,6 +187,7 @@ def forecast(
     """
     units = work_of(stage, config, sources)
     new = max(units - kept, 0.0)
+    reason = in_short(reason)
     if kept > 0:
         reason += f"; {min(kept, units):.0f} of {units:.0f} {stage} are taken over"
     told = [taken for folder in others if (taken := taken_by(folder, stage, config))]
@@ -195,6 +196,12 @@ def forecast(
     nearest = min(told, key=lambda taken: abs(math.log(taken.made / (new or units))))
     time_s = nearest.wall_time_s * new / nearest.made
     return Forecast(stage, reason, time_s, nearest.size_bytes * units / nearest.units, nearest.run)
+
+
+def in_short(reason: str) -> str:
+    """The first of many reasons, and how many more there are."""
+    first, *more = reason.split("; ")
+    return f"{first}, and {len(more)} more reasons" if len(more) > 1 else reason
 
 
 def duration_in_words(seconds: float) -> str:

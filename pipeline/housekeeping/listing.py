@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pipeline.artifacts import read_provenance
+from pipeline.errors import ArtifactError
 from pipeline.execution.running import read_summary
 from pipeline.execution.sealing import is_sealed
 from pipeline.execution.stage import RunFolder
@@ -12,6 +14,7 @@ from pipeline.execution.stage import RunFolder
 RUN_FILE = "run.toml"
 DEEPEST = 3  # levels, as in runs/paper/folds/fold-0
 EMBEDDED = "embedded objects"
+MESHES = "meshes/"  # before the name of each mesh file in a provenance
 TEST_ERROR, SUCCESS = "test |e|", "success"
 KILO = 1000.0  # the prefix of kB over that of B
 
@@ -127,9 +130,19 @@ def origin(folder: RunFolder) -> str:
     if not folder.artifact("objects").is_file():
         return ""
     given = read_summary(folder, "holdout").get("network")
-    return str(folder.noted_mesh_dir or EMBEDDED) + (
+    return str(folder.noted_mesh_dir or _recorded(folder.artifact("objects"))) + (
         f"; network {given}" if isinstance(given, str) else ""
     )
+
+
+def _recorded(objects: Path) -> str:
+    """What a file of objects says that it was made from: Make notes a folder, and no one else."""
+    try:
+        inputs = read_provenance(objects).inputs
+    except ArtifactError:
+        return "damaged objects"
+    meshes = sum(used.path.startswith(MESHES) for used in inputs)
+    return f"{meshes} mesh files" if meshes else EMBEDDED
 
 
 def size_in_words(size_bytes: float) -> str:

@@ -15,6 +15,7 @@ from pipeline.config.written import as_toml
 from pipeline.control.success import Outcome
 from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder
+from pipeline.execution.freshness import Key
 from pipeline.execution.staleness import built_key
 from pipeline.housekeeping.listing import disk_use_bytes
 from pipeline.messages.grasps import read_grasps
@@ -27,6 +28,7 @@ from schemas.softgrip.v1.samples_pb2 import SampleBatch
 from schemas.softgrip.v1.scenes_pb2 import Scene
 from schemas.softgrip.v1.training_pb2 import TrainingResult
 
+MOST_NAMED = 3  # of what differs in a part of a key: a cell of a table has room for no more
 Clutter = tuple[str, tuple[str, ...]]  # its name and the objects that lie in it
 
 
@@ -222,8 +224,50 @@ def made_otherwise(ours: RunFolder, theirs: RunFolder, stages: tuple[str, ...]) 
             if (mine is None) != (other is None):
                 found[stage] = f"not made in {lacking.path.name}"
         elif mine.digest != other.digest:
-            found[stage] = "; ".join(mine.differences(other))
+            found[stage] = "; ".join(
+                change
+                for word in ("configuration", "code", "input", "machine")
+                for change in part_changes(word, _part(mine, word), _part(other, word))
+            )
     return found
+
+
+def part_changes(word: str, mine: Mapping[str, str], other: Mapping[str, str]) -> list[str]:
+    """Name what differs between two parts of keys, some of many.
+
+    Parameters
+    ----------
+    word
+        What the part's names are.
+    mine
+        Name → digest, of A.
+    other
+        The same, of B.
+
+    Returns
+    -------
+    At most three sentences: what differs, what is in A alone, what is in B alone.
+    """
+    groups = {
+        "of other content": [name for name in mine if name in other and mine[name] != other[name]],
+        "in A alone": [name for name in mine if name not in other],
+        "in B alone": [name for name in other if name not in mine],
+    }
+    found = []
+    for how, names in groups.items():
+        more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+        if names:
+            found.append(f"{word} {', '.join(names[:MOST_NAMED])}{more} {how}")
+    return found
+
+
+def _part(key: Key, word: str) -> Mapping[str, str]:
+    return {
+        "configuration": key.config,
+        "code": key.code,
+        "input": key.inputs,
+        "machine": key.machine,
+    }[word]
 
 
 @dataclass(frozen=True)

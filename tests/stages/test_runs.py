@@ -75,6 +75,8 @@ def test_make_leaves_a_sealed_run_as_it_is_on_another_machine(
         freshness.key(stage, run="tiny")
         key, artifact = folder.state(f"{stage}.key"), folder.artifact(stage)
         assert key.stat().st_mtime < artifact.stat().st_mtime  # Make compares these dates
+    freshness.plan("eval", run="tiny")
+    assert capsys.readouterr().out.endswith("is sealed: nothing in it is made anew\n")
     with pytest.raises(ArtifactError, match="sealed without sweep"):
         freshness.key("sweep", run="tiny")
     freshness.status(run="tiny")
