@@ -69,9 +69,6 @@ def key(stage: str, run: RunName = "default", mesh_dir: MeshDir = None) -> None:
 def plan(goal: str, run: RunName = "default", mesh_dir: MeshDir = None) -> None:
     """Print what `make GOAL` will do, about how long it takes and how much disk."""
     folder = RunFolder(RUNS_DIR / run)
-    if is_sealed(folder):
-        sys.stdout.write(f"{folder.path} is sealed: nothing in it is made anew\n")
-        return
     lines = as_lines(planned(folder, mesh_dir, [goal]), free_disk_bytes(folder))
     sys.stdout.write("\n".join(lines) + "\n")
 
@@ -132,7 +129,7 @@ def planned(folder: RunFolder, mesh_dir: Path | None, goals: list[str]) -> list[
     ends = [GOALS.get(goal, goal) for goal in goals]
     if unknown := [end for end in ends if end not in STAGES]:
         raise ConfigError(f"'{unknown[0]}' is no goal that makes artifacts", f"One of {names}")
-    wanted = names[: 1 + max(names.index(end) for end in ends)] if ends else []
+    wanted = names[: 1 + max(map(names.index, ends))] if ends and not is_sealed(folder) else []
     config = load_run_config(folder.config)
     meshes = list_mesh_files(mesh_dir) if mesh_dir is not None else []
     limit = config.objects.limit or len(meshes)

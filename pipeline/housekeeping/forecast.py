@@ -86,11 +86,14 @@ def work_of(stage: str, config: RunConfig, sources: int) -> float:
     grasps = sum(map(sum, config.grasps.of_scenes(max(levels * sum(clutters.values()), 1))))
     if stage == "objects":
         trained = 1 - config.split.val_fraction - config.split.test_fraction
-        return sources * (1 + trained * config.objects.stretched_copies)
+        each = 1 + trained * config.objects.stretched_copies
+        return (sources + config.objects.random_solids) * each
     if stage == "scenes":
         return float(levels * sum(clutters.values()))
-    if stage == "train":
-        return float(grasps * config.train.epochs)
+    if stage in ("shards", "train"):
+        share = clutters.get("train", 0) / max(sum(clutters.values()), 1)
+        samples: float = grasps * (1 + share * (config.grasps.noise_draws - 1))
+        return samples * config.train.epochs if stage == "train" else samples
     if stage == "evaluate":
         picked = clutters.get(config.evaluate.split, 0)
         robot = config.evaluate.imperfection
