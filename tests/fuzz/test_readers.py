@@ -16,6 +16,9 @@ FORBIDDEN = ("torch.load", "torch.save", "eval", "exec")
 BETWEEN_OWN_PROCESSES = {
     ROOT / "pipeline/execution/ray_executor.py",
     ROOT / "pipeline/execution/isolated.py",
+    ROOT / "pipeline/execution/rendering_nodes.py",
+    ROOT / "pipeline/benchmarks/asked.py",
+    ROOT / "pipeline/benchmarks/commits.py",
 }
 PICKLES = {"pickle", "cPickle", "_pickle", "dill", "cloudpickle", "joblib", "shelve", "marshal"}
 

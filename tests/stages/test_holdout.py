@@ -119,6 +119,6 @@ def test_labels_that_are_no_number_are_told(
 ) -> None:
     names, samples = stages.holdout.labelled(made)
     samples.quality[3] = np.nan
-    monkeypatch.setattr(stages.holdout, "gather", lambda _: (names, {"test": samples}))
+    monkeypatch.setattr(stages.holdout, "read_all_grasps", lambda _: (names, {"test": samples}))
     with pytest.raises(ArtifactError, match=r"1 of \d+ labels are no number in \[0, 1\]"):
         stages.holdout.labelled(made)
