@@ -85,9 +85,9 @@ def run_in_order(
         for item in items:
             waiting.append(_submit(pool, job, item))
             if len(waiting) >= workers * ahead_per_worker:
-                yield waiting.popleft().result(_seconds(limit_s))
+                yield waiting.popleft().result(wait_s(limit_s))
         while waiting:
-            yield waiting.popleft().result(_seconds(limit_s))
+            yield waiting.popleft().result(wait_s(limit_s))
     except TimeoutError as error:
         _kill_workers()
         raise too_long(limit_s) from error
@@ -111,7 +111,7 @@ def too_long(limit_s: float) -> SoftgripError:
     )
 
 
-def _seconds(limit_s: float) -> float | None:
+def wait_s(limit_s: float) -> float | None:
     """As `concurrent.futures` and Ray want it: None for no limit."""
     return None if math.isinf(limit_s) else limit_s
 

@@ -136,18 +136,44 @@ def cluster_nodes(here: Found, modules: Sequence[str], asked: RendererName) -> l
         Ray is not installed, or no cluster answers.
     """
     with connected() as ray:
-        from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
-
         living = [node for node in ray.nodes() if node["Alive"] and node["Resources"].get("CPU")]
-        looks = []
-        for node in living:
-            there = NodeAffinitySchedulingStrategy(node["NodeID"], soft=False)
-            look = ray.remote(num_cpus=0, scheduling_strategy=there, max_retries=0)(_look)
-            looks.append(look.remote(str(Path.cwd()), list(modules), asked))
+        sent = str(Path.cwd()), list(modules), asked
+        looks = [
+            on_node(ray, node["NodeID"], max_retries=0)(_look).remote(*sent) for node in living
+        ]
         nodes = [
             _node(node, _answer(ray, look), here) for node, look in zip(living, looks, strict=True)
         ]
     return sorted(nodes, key=lambda node: (node.name, node.node_id))
+
+
+def on_node(ray: ModuleType, node_id: str, **options: Any) -> Any:
+    """Ray's decorator for what runs on one node and asks for none of its CPUs.
+
+    Parameters
+    ----------
+    ray
+        Ray, connected.
+    node_id
+        Ray's own name of the node.
+    **options
+        Further options of ``ray.remote``.
+
+    Returns
+    -------
+    Makes a function, or a class, remote.
+    """
+    from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
+
+    there = NodeAffinitySchedulingStrategy(node_id, soft=False)
+    return ray.remote(num_cpus=0, scheduling_strategy=there, **options)
+
+
+def enter(folder: str) -> None:
+    """On a node: work where the driver does, with the project that lies there."""
+    os.chdir(folder)
+    if folder not in sys.path:
+        sys.path.insert(0, folder)
 
 
 def what_is_here(modules: Sequence[str], asked: RendererName) -> Found:
@@ -246,13 +272,8 @@ def _look(folder: str, modules: list[str], asked: RendererName) -> str:
     """On a node: what is there, as JSON; a sentence where the driver's folder is not."""
     if not (Path(folder) / "pipeline").is_dir():
         return json.dumps(f"does not see the project under {folder}")
-    os.chdir(folder)
-    if folder not in sys.path:
-        sys.path.insert(0, folder)
-    from pipeline.errors import MachineError as MissingThere
-    from pipeline.execution.ray_cluster import what_is_here as look_around
-
+    enter(folder)
     try:
-        return json.dumps(asdict(look_around(modules, asked)))
-    except MissingThere as error:
+        return json.dumps(asdict(what_is_here(modules, asked)))
+    except MachineError as error:
         return json.dumps(error.what)

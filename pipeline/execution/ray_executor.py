@@ -8,7 +8,6 @@ that Ray ends because its node runs out of memory, as often.
 import importlib
 import io
 import math
-import os
 import pickle
 import sys
 from collections import deque
@@ -20,8 +19,8 @@ from types import ModuleType
 from typing import Any, TypeVar
 
 from pipeline.errors import MachineError, SoftgripError
-from pipeline.execution.executors import too_long
-from pipeline.execution.ray_cluster import MOST_RETRIES, connected
+from pipeline.execution.executors import too_long, wait_s
+from pipeline.execution.ray_cluster import MOST_RETRIES, connected, enter
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -116,16 +115,14 @@ def _in_order(
 def _result(sent: Any, program: str, lost: Callable[[str], Any] | None, limit_s: float) -> Any:
     """The result of an item, waited for; a worker's death after all retries is told or ``lost``."""
     import ray
-    from ray.exceptions import GetTimeoutError, OutOfMemoryError, RayTaskError, WorkerCrashedError
+    from ray.exceptions import GetTimeoutError, OutOfMemoryError, WorkerCrashedError
 
     try:
-        limit = None if math.isinf(limit_s) else limit_s
-        return unpickled(ray.get(sent, timeout=limit), {program: "__main__"})
-    except GetTimeoutError as error:
-        ray.cancel(sent, force=True)
-        raise too_long(limit_s) from error
-    except RayTaskError as error:
-        raise error.cause from error
+        return result_of(sent, program, limit_s)
+    except SoftgripError as error:
+        if isinstance(error.__cause__, GetTimeoutError):
+            ray.cancel(sent, force=True)
+        raise
     except (OutOfMemoryError, WorkerCrashedError) as error:
         memory = isinstance(error, OutOfMemoryError)
         if lost is not None:
@@ -137,6 +134,38 @@ def _result(sent: Any, program: str, lost: Callable[[str], Any] | None, limit_s:
             "Run the same command again, it goes on where it stopped"
             + ("; give the nodes more memory, or fewer CPUs" if memory else ""),
         ) from error
+
+
+def result_of(sent: Any, program: str, limit_s: float) -> Any:
+    """What `_run_there` made of an item, waited for.
+
+    Parameters
+    ----------
+    sent
+        Ray's reference to the result.
+    program
+        Module that is ``__main__`` here.
+    limit_s
+        How long it may be waited for [s].
+
+    Returns
+    -------
+    The result.
+
+    Raises
+    ------
+    SoftgripError
+        It took longer; what the item raises itself arrives as it was raised.
+    """
+    import ray
+    from ray.exceptions import GetTimeoutError, RayTaskError
+
+    try:
+        return unpickled(ray.get(sent, timeout=wait_s(limit_s)), {program: "__main__"})
+    except GetTimeoutError as error:
+        raise too_long(limit_s) from error
+    except RayTaskError as error:
+        raise error.cause from error
 
 
 def job_by_name(job: Callable[[Item], Result]) -> JobByName:
@@ -207,9 +236,7 @@ def _run_there(sent: bytes, folder: str, program: str) -> bytes:
     -------
     What the job makes of the item.
     """
-    os.chdir(folder)
-    if folder not in sys.path:
-        sys.path.insert(0, folder)
+    enter(folder)
     job, item = unpickled(sent, {"__main__": program})
     return pickle.dumps(job(item))
 

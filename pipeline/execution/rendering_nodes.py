@@ -17,7 +17,7 @@ from loguru import logger
 
 from pipeline.config.cameras import RendererName
 from pipeline.errors import SoftgripError
-from pipeline.execution.executors import Executor, too_long
+from pipeline.execution.executors import Executor
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -61,8 +61,14 @@ def run_on_rendering_nodes(
     if executor == "local":
         yield from map(job, items)
         return
-    from pipeline.execution.ray_cluster import Node, cluster_nodes, connected, what_is_here
-    from pipeline.execution.ray_executor import job_by_name  # Ray is an optional package
+    from pipeline.execution.ray_cluster import (
+        Node,
+        cluster_nodes,
+        connected,
+        on_node,
+        what_is_here,
+    )
+    from pipeline.execution.ray_executor import Worker, job_by_name  # Ray is an optional package
 
     named = job_by_name(job)
     with connected() as ray:
@@ -77,7 +83,8 @@ def run_on_rendering_nodes(
             logger.warning("no node of the cluster renders as this driver does: it renders itself")
             yield from map(job, items)
             return
-        processes = [_Process(node.name, _started(ray, node.node_id)) for node in able]
+        # A renderer asks for no CPU: it shares its node's with other jobs.
+        processes = [_Process(n.name, on_node(ray, n.node_id)(Worker).remote()) for n in able]
         try:
             yield from _in_order(ray, named, items, processes, limit_s)
         finally:
@@ -94,16 +101,6 @@ class _Process:
     holds: int = 0
 
 
-def _started(ray: ModuleType, node_id: str) -> Any:
-    """An actor on a node. It asks for no CPU: a renderer shares its node's with other jobs."""
-    from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
-
-    from pipeline.execution.ray_executor import Worker
-
-    there = NodeAffinitySchedulingStrategy(node_id, soft=False)
-    return ray.remote(num_cpus=0, scheduling_strategy=there)(Worker).remote()
-
-
 def _in_order(
     ray: ModuleType,
     job: Any,
@@ -112,27 +109,22 @@ def _in_order(
     limit_s: float,
 ) -> Iterator[Any]:
     """Results in the order of the items; items of a process that is lost go to another."""
-    from pipeline.execution.ray_executor import program_name, unpickled
+    from pipeline.execution.ray_executor import program_name, result_of
 
-    limit = None if math.isinf(limit_s) else limit_s
     program, there, living = program_name(), str(Path.cwd()), list(processes)
     waiting: deque[tuple[bytes, _Process, Any]] = deque()
 
-    def send(item: bytes) -> None:
+    def sent(item: bytes) -> tuple[bytes, _Process, Any]:
         chosen = min(living, key=lambda process: process.holds)
         chosen.holds += 1
-        waiting.append((item, chosen, chosen.actor.run.remote(item, there, program)))
+        return item, chosen, chosen.actor.run.remote(item, there, program)
 
     def next_result() -> Any:
         while True:
             item, process, ref = waiting.popleft()
             process.holds -= 1
             try:
-                return unpickled(ray.get(ref, timeout=limit), {program: "__main__"})
-            except ray.exceptions.GetTimeoutError as error:
-                raise too_long(limit_s) from error
-            except ray.exceptions.RayTaskError as error:
-                raise error.cause from error
+                return result_of(ref, program, limit_s)
             except ray.exceptions.RayActorError as error:
                 if process in living:
                     living.remove(process)
@@ -142,13 +134,10 @@ def _in_order(
                         "Every node of the Ray cluster that renders is lost",
                         "Run the same command again, it goes on where it stopped",
                     ) from error
-                chosen = min(living, key=lambda process: process.holds)
-                chosen.holds += 1
-                ref = chosen.actor.run.remote(item, there, program)
-                waiting.appendleft((item, chosen, ref))
+                waiting.appendleft(sent(item))
 
     for item in items:
-        send(pickle.dumps((job, item)))
+        waiting.append(sent(pickle.dumps((job, item))))
         if len(waiting) >= AHEAD_PER_NODE * len(living):
             yield next_result()
     while waiting:

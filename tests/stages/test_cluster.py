@@ -40,6 +40,17 @@ def digests(folder: RunFolder) -> dict[str, str]:
     }
 
 
+def make(goal: str, project: Path, environment: dict[str, str]) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        ["make", goal, "RUN=ci", "EXECUTOR=ray"],
+        cwd=project,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
 def test_six_stages_from_cold_write_the_bytes_of_local_processes_though_a_node_dies(
     cluster: object, run: RunFolder, tmp_path: Path
 ) -> None:
@@ -66,23 +77,9 @@ def test_six_stages_from_cold_write_the_bytes_of_local_processes_though_a_node_d
     assert dataset.returncode == 0, errors[-3000:]
     assert "renders nothing" not in errors  # both nodes are this machine, with its renderer
     assert "renders itself" not in errors
-    judged = subprocess.run(
-        ["make", "eval", "RUN=ci", "EXECUTOR=ray"],
-        cwd=copy,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    judged = make("eval", copy, environment)
     assert judged.returncode == 0, judged.stderr[-3000:]
     assert digests(folder) == digests(run)
-    told = subprocess.run(
-        ["make", "status", "RUN=ci", "EXECUTOR=ray"],
-        cwd=copy,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    told = make("status", copy, environment)
     assert told.returncode == 0, told.stderr[-3000:]
     assert "cluster: 1 of 1 nodes can do this run's work, on 1 cores" in told.stdout
