@@ -8,10 +8,12 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
+from loguru import logger
 
 from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact
 from pipeline.artifacts.sharding import is_current
 from pipeline.config import RunConfig
+from pipeline.errors import SceneError
 from pipeline.execution import generator
 from pipeline.labelling.scene import label_scene, scene_surfaces
 from pipeline.labelling.shown_pads import drape_some_again
@@ -73,19 +75,19 @@ class ShardResult:
 def synthesize_shard(job: ShardJob) -> ShardResult:
     """Make, or keep, the shard of one scene."""
     if is_current(job.shard, job.provenance.key):
-        return examined(job.shard)
+        return examined(job)
     draping, world, began = Stopwatch(), LabelledWorld(job), time.process_time()
     former = {p: read_portion(p.former, p.key) for p in job.portions if p.former}
     portions = [former.get(portion) or world.labelled(portion) for portion in job.portions]
     messages = [message for portion in portions for message in portion]
     with ArtifactWriter(job.shard, job.provenance) as artifact:
         written = write_messages(artifact, messages)
-        if job.pads:
+        if job.pads and messages:
             with draping.running():
                 labelled = [grasps_of(rows)[1] for rows, _ in messages]
                 pads = drape_some_again(labelled, job.pads, world.surfaces, job.config)
                 artifact.write(PADS_TOPIC, pads_message(pads), log_time_ns=written)
-    found = examined(job.shard)
+    found = examined(job)
     taken_over = sum(map(bool, former.values()))
     spent_s = time.process_time() - began
     return replace(found, taken_over=taken_over, recording_s=draping.seconds, spent_s=spent_s)
@@ -112,19 +114,28 @@ class LabelledWorld:
         """Label a portion of its grasps; the first is drawn from the stream of the scene."""
         config, stream = self.job.config, (portion.number,) if portion.number else ()
         rng = generator(config.seed, "grasps", self.scene.scene_id, *stream)
-        batches = label_scene(self.scene, self.surfaces, config, portion.grasps, rng)
+        try:
+            batches = label_scene(self.scene, self.surfaces, config, portion.grasps, rng)
+        except SceneError as error:
+            if config.scenes.impossible == "refused":
+                raise
+            logger.warning("left out: {}", error)
+            return []
         size, rounded = config.grasps.samples_per_message, config.sensing.rounded
         return grasp_messages(batches, size, rounded, portion.key)
 
 
-def examined(shard: Path) -> ShardResult:
+def examined(job: ShardJob) -> ShardResult:
     """What a finished shard holds, read back from the file itself."""
     quality, names, split = [], set(), ""
     status: Counter[str] = Counter()
-    with open_artifact(shard) as artifact:
+    with open_artifact(job.shard) as artifact:
         for origin, grasps in read_grasps(artifact, clouds=False):
             split = origin.split
             quality.append(grasps.quality)
             names |= {origin.object_names[i] for i in np.unique(grasps.object_index)}
             status.update(origin.status_names[s] for s in grasps.status)
-    return ShardResult(shard, split, np.concatenate(quality), tuple(sorted(names)), dict(status))
+    # A shard of a scene that was left out holds no grasp to tell the split.
+    split = split or LabelledWorld(job).scene.split
+    all_q = np.concatenate(quality) if quality else np.empty(0)
+    return ShardResult(job.shard, split, all_q, tuple(sorted(names)), dict(status))

@@ -46,7 +46,7 @@ def holdout_config(config: RunConfig) -> RunConfig:
     """A run's configuration with every object in the test split, as [holdout] wants it.
 
     Settings for the run's own meshes are left out: families, masses, copies, a limit, transparent
-    names.
+    names; and success over the size of the robot's errors, which tells of policies, not of meshes.
     """
     wanted = config.holdout
     return config.model_copy(
@@ -73,7 +73,11 @@ def holdout_config(config: RunConfig) -> RunConfig:
             ),
             "grasps": config.grasps.model_copy(update={"count": wanted.labelled} | SHARED_OUT),
             "evaluate": config.evaluate.model_copy(
-                update={"split": "test", "policies": wanted.policies}
+                update={
+                    "split": "test",
+                    "policies": wanted.policies,
+                    "imperfection": config.evaluate.imperfection.model_copy(update={"curve": ()}),
+                }
             ),
         }
     )

@@ -132,21 +132,11 @@ def visible_surface(view: CameraView, surfaces: Surfaces, radius_m: float) -> Vi
 
     Returns
     -------
-    A point and a normal for each pixel that shows an object.
-
-    Raises
-    ------
-    SceneError
-        The camera sees no object.
+    A point and a normal for each pixel that shows an object; none where the picture shows none.
     """
     origin, directions = pixel_rays(view.camera, view.segmentation > 0)
     hits = surfaces.cast(np.broadcast_to(origin, directions.shape), directions)
     seen = hits.body > 0
-    if not seen.any():
-        raise SceneError(
-            f"Camera {view.camera.name} sees no object",
-            "Change cameras.static.elevations_rad or azimuths_rad",
-        )
     points = origin + hits.distance_m[seen, None] * directions[seen]
     whole = shown_whole(view.camera, points, radius_m)
     normals = surfaces.normals_at(hits)[seen]

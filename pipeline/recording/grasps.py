@@ -99,6 +99,8 @@ def shown_grasps(placed: tuple[PlacedObject, ...], shard: Path) -> list[ShownGra
     """The grasps of a shard that have their pads in it."""
     with open_artifact(shard) as artifact:
         batches = list(read_grasps(artifact))
+        if not batches:
+            return []
         pads = pads_of(artifact.one(DrapedPads))
     rows = [(origin, batch, row) for origin, batch in batches for row in range(len(batch))]
     shown = []

@@ -1,0 +1,51 @@
+"""A scene on which no grasp can be tried: refused, or left out by name."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from loguru import logger
+
+from pipeline.artifacts import read_provenance
+from pipeline.config import load_run_config
+from pipeline.errors import SceneError
+from pipeline.execution import RunFolder
+from pipeline.recording.grasps import shown_grasps
+from stages.grasp_shards import Portion, ShardJob, synthesize_shard
+
+
+@pytest.fixture
+def unseen(run: RunFolder, tmp_path: Path) -> ShardJob:
+    """Grasps are wanted where a surface faces the camera exactly: nowhere."""
+    config = load_run_config(run.config)
+    grasps = config.grasps.model_copy(update={"seen_angle_max_rad": 1e-9})
+    return ShardJob(
+        scene_index=0,
+        portions=(Portion(0, 10, "a key", None),),
+        pads=2,
+        shard=tmp_path / "shard.mcap",
+        objects=run.artifact("objects"),
+        scenes=run.artifact("scenes"),
+        config=config.model_copy(update={"grasps": grasps}),
+        provenance=read_provenance(run.artifact("grasps")),
+    )
+
+
+def test_it_ends_a_run_in_one_sentence(unseen: ShardJob) -> None:
+    with pytest.raises(SceneError, match=r"No camera of scene .* sees a surface face on"):
+        synthesize_shard(unseen)
+    assert not unseen.shard.exists()
+
+
+def test_where_clutters_may_be_left_out_its_shard_is_empty_and_says_so(unseen: ShardJob) -> None:
+    scenes = unseen.config.scenes.model_copy(update={"impossible": "left out"})
+    job = replace(unseen, config=unseen.config.model_copy(update={"scenes": scenes}))
+    told: list[str] = []
+    sink = logger.add(told.append, format="{message}")
+    made, found_again = synthesize_shard(job), synthesize_shard(job)
+    logger.remove(sink)
+    assert len(made.quality) == len(found_again.quality) == 0
+    assert made.split == found_again.split == "train"
+    assert len(told) == 1
+    assert told[0].startswith("left out: No camera of scene")
+    assert shown_grasps((), job.shard) == []
