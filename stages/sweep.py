@@ -1,21 +1,22 @@
 """Study, sweep: shards → the GA-CNN family on one budget, Fig. 1, and what its parts buy.
 
-``make sweep`` trains every depth of every channel set, then the run's own network with and without
-attention and symmetry. Each network is a work item of its own, on one thread: finished ones are
-kept in small files, a killed one goes on within its epoch. Networks are timed afterwards, one at a
-time.
+``make sweep`` trains every depth of every channel set, some of them with several seeds, then the
+run's own network with and without attention and symmetry. Each network is a work item of its own,
+on one thread: finished ones are kept in small files, a killed one goes on within its epoch.
+Networks are timed afterwards, one at a time.
 
 What it leaves, for Fig. 1 and the ablation table:
 
 - ``sweep.mcap``: on ``/budget`` one ``SweepBudget`` (samples, epochs, error of the mean predictor);
-  on ``/networks`` a ``SweepNetwork`` each: ``group`` "family" or "ablation", ``variant``,
+  on ``/networks`` a ``SweepNetwork`` each: ``group`` "family", "repeat" or "ablation", ``variant``,
   ``layers``, ``channels``, ``seed``, ``parameters``, ``multiply_adds``, ``val_mae`` and its
   standard error ``val_mae_spread``, ``test_mae_single`` (one prediction a grasp),
   ``test_mae_averaged`` (mean over its eight symmetries), ``test_mae`` (the averaged one where it
   was trained with symmetries), ``test_mae_by_class``, ``curve`` (an ``Epoch`` each), ``chosen``
   (one of the family), ``of_run``.
 - ``sweep.summary.json``: ``networks``, a list of the same with ``ms_a_grasp`` (PyTorch on the CPU,
-  batch 64, two threads), for time is no part of an artifact; ``chosen``, one of them;
+  batch 64, two threads), for time is no part of an artifact; ``chosen``, one of them; ``seeds``:
+  what another seed changes, and which networks differ by more;
   ``ablation``: variant → each seed's ``test_mae_single`` and ``test_mae_averaged``; ``budget``.
 - ``sweep.rrd``: error and time against depth, a curve a channel set.
 """
@@ -70,7 +71,7 @@ class MemberJob:
 
 
 def build(stage: StageContext) -> Summary:
-    """Train the family and the ablation on one budget, time them, mark the chosen one."""
+    """Train family, repeats and ablation on one budget, time them, mark the chosen one."""
     config = stage.config
     given = given_samples(config, stage.upstream("shards"), stage.folder.state(SAMPLES))
     jobs = member_jobs(stage)
@@ -89,7 +90,7 @@ def build(stage: StageContext) -> Summary:
 
 
 def member_jobs(stage: StageContext) -> list[MemberJob]:
-    """Every member of the family, then those of the ablation."""
+    """Every member of the family, its repeats, then those of the ablation."""
     config = stage.config
     return [
         MemberJob(

@@ -138,6 +138,15 @@ class SweepConfig(Section):
         min_length=1,
         description="channel sets; IV: four, of which 64-128-256-512 was chosen",
     )
+    seeds: int = Field(
+        3,
+        ge=1,
+        description="trainings of some of the family, which tell what chance alone changes; 1: "
+        "every network is trained once",
+    )
+    seeded_every: int = Field(
+        4, ge=1, description="of the family, every so many networks are trained with all seeds"
+    )
     ablation_seeds: int = Field(
         3, ge=0, description="trainings of the run's network with, and without each of its parts"
     )

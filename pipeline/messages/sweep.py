@@ -1,5 +1,9 @@
 """A sweep's networks and budget ↔ softgrip.v1.SweepNetwork and SweepBudget."""
 
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import asdict
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +14,14 @@ from pipeline.config import RunConfig
 from pipeline.config.learning import NetworkConfig
 from pipeline.messages.training import epoch_message
 from pipeline.network.baselines import mean_predictor_mae
-from pipeline.network.family import VARIANTS, Member, MemberFigures, choose_member
+from pipeline.network.family import (
+    VARIANTS,
+    Member,
+    MemberFigures,
+    SeedSpread,
+    choose_member,
+    seed_spread,
+)
 from pipeline.network.samples import Samples
 from pipeline.network.training import TrainedNetwork
 from schemas.softgrip.v1.training_pb2 import SweepBudget, SweepNetwork
@@ -57,6 +68,57 @@ def mark_networks(networks: list[SweepNetwork], of_run: NetworkConfig) -> None:
     family[chosen].chosen = True
 
 
+def spread_of_seeds(networks: Sequence[SweepNetwork]) -> SeedSpread | None:
+    """What the seed alone changes in ``test_mae``; None where nothing was trained twice."""
+    errors = defaultdict(list)
+    for network in networks:
+        if network.group in ("family", "repeat"):
+            errors[network.layers, tuple(network.channels)].append(network.test_mae)
+    return seed_spread([*errors.values()])
+
+
+def told_differences(networks: Sequence[SweepNetwork], spread: SeedSpread) -> dict[str, Any]:
+    """Which networks of the family differ in test error by more than the seeds explain.
+
+    Parameters
+    ----------
+    networks
+        Of one sweep, one of them chosen.
+    spread
+        What the seed alone changes.
+
+    Returns
+    -------
+    The spread's values; how many pairs of the family there are and how many differ; and the names
+    (channels and layers) of those that are better and worse than the chosen one.
+    """
+    family = [network for network in networks if network.group == "family"]
+    (chosen,) = (network for network in family if network.chosen)
+    least = spread.least_difference
+    pairs = [abs(one.test_mae - other.test_mae) for one, other in combinations(family, 2)]
+    return {
+        **asdict(spread),
+        "pairs": len(pairs),
+        "pairs_that_differ": sum(difference > least for difference in pairs),
+        "better_than_chosen": [
+            member_name(one) for one in family if chosen.test_mae - one.test_mae > least
+        ],
+        "worse_than_chosen": [
+            member_name(one) for one in family if one.test_mae - chosen.test_mae > least
+        ],
+    }
+
+
+def channels_name(network: SweepNetwork) -> str:
+    """Name of a channel set, such as ``64-128-256-512``."""
+    return "-".join(map(str, network.channels))
+
+
+def member_name(network: SweepNetwork) -> str:
+    """Channels and layers, such as ``64-128-256-512, 52``."""
+    return f"{channels_name(network)}, {network.layers}"
+
+
 def network_config_of(network: SweepNetwork) -> NetworkConfig:
     """Configuration of a network of the sweep."""
     attention = "none" if network.variant == "no attention" else "cbam"
@@ -95,7 +157,9 @@ def sweep_summary(
         }
         for variant in VARIANTS
     }
+    spread = spread_of_seeds(networks)
     return {
+        "seeds": told_differences(networks, spread) if spread else {},
         "chosen": next(row for row in rows if row["chosen"]),
         "ablation": ablation,
         "budget": plain_values(budget),

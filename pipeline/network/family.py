@@ -5,6 +5,10 @@ performance in the aspects of both the average error and computational complexit
 the one-standard-error rule: of the members whose validation error is no further above the lowest
 than the standard error of that lowest, the one of fewest multiply-adds.
 
+What a training arrives at depends on its seed too. Some of the family are trained with several
+seeds; the pooled standard deviation within them says by how much two networks must differ for it to
+be more than chance.
+
 The ablation takes one member and leaves out one part at a time: attention (what remains is a
 residual network of the same depth and width), and the symmetries (neither turned and mirrored in
 training nor averaged over in prediction).
@@ -17,6 +21,7 @@ from typing import Literal
 import numpy as np
 import torch
 from jaxtyping import Bool, Float
+from scipy.stats import t as student_t
 from torch.utils.flop_counter import FlopCounterMode
 
 from pipeline.config.learning import NetworkConfig, SweepConfig, TrainConfig
@@ -27,6 +32,8 @@ from pipeline.network.inference import predict
 from pipeline.network.samples import Samples
 from pipeline.network.timing import milliseconds_a_grasp
 from pipeline.network.training import TrainedNetwork
+
+CONFIDENCE = 0.95  # that a difference is not of the seeds, as for all intervals here
 
 Variant = Literal["ga-cnn", "no attention", "no augmentation"]
 VARIANTS: tuple[Variant, ...] = ("ga-cnn", "no attention", "no augmentation")
@@ -39,7 +46,7 @@ class Member:
     Attributes
     ----------
     group
-        "family" of Fig. 1, or "ablation".
+        "family" of Fig. 1; "repeat", one of the family with another seed; or "ablation".
     variant
         Which part is left out; "ga-cnn": none.
     network
@@ -48,7 +55,7 @@ class Member:
         Seed of its weights and of its order of samples.
     """
 
-    group: Literal["family", "ablation"]
+    group: Literal["family", "repeat", "ablation"]
     variant: Variant
     network: NetworkConfig
     seed: int
@@ -102,12 +109,15 @@ class MemberFigures:
 
 
 def list_members(sweep: SweepConfig, of_run: NetworkConfig, seed: int) -> list[Member]:
-    """The members to train: the family, by channel set and then depth, then the ablation.
+    """The members to train: the family by channel set and depth, its repeats, the ablation.
+
+    Those repeated are spread over depths and channel sets: every ``sweep.seeded_every``-th along a
+    channel set, one depth further in each.
 
     Parameters
     ----------
     sweep
-        Depths and channel sets of the family, and seeds of the ablation.
+        Depths and channel sets of the family, seeds of its repeats and of the ablation.
     of_run
         The network that parts are left out of.
     seed
@@ -127,6 +137,13 @@ def list_members(sweep: SweepConfig, of_run: NetworkConfig, seed: int) -> list[M
         for channels in sweep.channels
         for layers in sweep.depths
     ]
+    repeats = [
+        Member("repeat", "ga-cnn", NetworkConfig(layers=layers, channels=channels), seed + repeat)
+        for repeat in range(1, sweep.seeds)
+        for row, channels in enumerate(sweep.channels)
+        for column, layers in enumerate(sweep.depths)
+        if (row + column) % sweep.seeded_every == 0
+    ]
     ablation = [
         Member(
             "ablation",
@@ -139,9 +156,10 @@ def list_members(sweep: SweepConfig, of_run: NetworkConfig, seed: int) -> list[M
         for repeat in range(sweep.ablation_seeds)
         for variant in VARIANTS
     ]
-    for member in (*family, *ablation):
+    members = [*family, *repeats, *ablation]
+    for member in members:
         build_network(member.network, seed=0)  # said before the first training, not after hours
-    return [*family, *ablation]
+    return members
 
 
 def take_budget(sweep: SweepConfig, split: str, samples: Samples) -> Samples:
@@ -231,6 +249,48 @@ def multiply_adds(network: GaCnn, cells: int) -> int:
 def standard_error(errors: Float[np.ndarray, " n"]) -> float:
     """Standard error of the errors' mean."""
     return float(errors.std(dtype=np.float64) / np.sqrt(len(errors)))
+
+
+@dataclass(frozen=True)
+class SeedSpread:
+    """What the seed alone changes in an error.
+
+    Attributes
+    ----------
+    deviation
+        Standard deviation of one training's error, pooled over the networks trained repeatedly.
+    degrees
+        Degrees of freedom of that estimate.
+    least_difference
+        Two networks, each trained once, whose errors differ by more than this differ by more than
+        chance (two-sided, ``CONFIDENCE``): t · √2 · deviation.
+    """
+
+    deviation: float
+    degrees: int
+    least_difference: float
+
+
+def seed_spread(repeated: Sequence[Sequence[float]]) -> SeedSpread | None:
+    """Pool the spread of errors within networks that were trained with several seeds.
+
+    Parameters
+    ----------
+    repeated
+        For each network the errors of its trainings; one error says nothing.
+
+    Returns
+    -------
+    The spread; None where no network was trained twice.
+    """
+    groups = [np.asarray(errors, dtype=np.float64) for errors in repeated]
+    degrees = sum(len(errors) - 1 for errors in groups)
+    if degrees < 1:
+        return None
+    squares = sum(float(((errors - errors.mean()) ** 2).sum()) for errors in groups)
+    deviation = float(np.sqrt(squares / degrees))
+    quantile = float(student_t.ppf((1 + CONFIDENCE) / 2, degrees))
+    return SeedSpread(deviation, degrees, quantile * float(np.sqrt(2)) * deviation)
 
 
 def choose_member(

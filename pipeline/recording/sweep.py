@@ -9,7 +9,12 @@ import rerun.blueprint as rrb
 
 from pipeline.artifacts import open_artifact
 from pipeline.errors import ArtifactError
-from pipeline.messages.sweep import read_sweep
+from pipeline.messages.sweep import (
+    channels_name,
+    read_sweep,
+    spread_of_seeds,
+    told_differences,
+)
 from pipeline.network.family import VARIANTS
 from pipeline.recording import colours
 from pipeline.recording.recording import FinishedStage, name_curve, recording, set_step, time_panel
@@ -92,14 +97,15 @@ def show_sweep(
             stream.log(f"curves/{curve}/{channels_name(network)}", rr.Scalars(value))
             if network.chosen:
                 stream.log(f"curves/{curve}/chosen", rr.Scalars(value))
-    text = f"{describe_budget(budget)}\n\n{family_table(family)}\n\n{ablation_table(networks)}\n"
+    parts = (
+        describe_budget(budget),
+        describe_seeds(networks),
+        family_table(family),
+        ablation_table(networks),
+    )
+    text = "\n\n".join(filter(None, parts)) + "\n"
     document = rr.TextDocument(text, media_type=rr.MediaType.MARKDOWN)
     stream.log("notes/sweep", document, static=True)
-
-
-def channels_name(network: SweepNetwork) -> str:
-    """Name of a channel set, such as ``64-128-256-512``."""
-    return "-".join(map(str, network.channels))
 
 
 def describe_budget(budget: SweepBudget) -> str:
@@ -108,6 +114,22 @@ def describe_budget(budget: SweepBudget) -> str:
         f"{budget.train_samples} training samples, {budget.epochs} epochs, batches of "
         f"{budget.batch_size}; {budget.test_samples} test samples, of which the mean predictor "
         f"errs by {budget.mean_predictor_mae:.4f}."
+    )
+
+
+def describe_seeds(networks: Sequence[SweepNetwork]) -> str:
+    """What chance alone changes, and what differs by more; nothing where all were trained once."""
+    spread = spread_of_seeds(networks)
+    if spread is None:
+        return ""
+    told = told_differences(networks, spread)
+    return (
+        f"Another seed changes an error by {spread.deviation:.4f} (standard deviation, "
+        f"{spread.degrees} degrees of freedom). Two networks trained once differ by more than "
+        f"chance (95 %) where their errors differ by more than {spread.least_difference:.4f}: "
+        f"{told['pairs_that_differ']} of {told['pairs']} pairs do. Of the family, "
+        f"{len(told['better_than_chosen'])} are better than the chosen one by more than that, "
+        f"{len(told['worse_than_chosen'])} worse."
     )
 
 

@@ -42,7 +42,8 @@ def figures_of(
             for network in sweep["networks"]
             if network["group"] == "family"
         ]
-        svg["fig-1"] = plots.fig_1(members, sweep["budget"]["mean_predictor_mae"])
+        deviation = sweep.get("seeds", {}).get("deviation", 0.0)
+        svg["fig-1"] = plots.fig_1(members, sweep["budget"]["mean_predictor_mae"], deviation)
     if success:
         svg["success"] = plots.success_by_level(rates(success))
     if curve := (summaries["evaluate"] or {}).get("imperfection"):

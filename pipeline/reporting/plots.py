@@ -186,8 +186,22 @@ def lifted_by_quality(by_ranking: Mapping[str, Sequence[Mapping[str, Any]]]) -> 
         return svg_text(figure)
 
 
-def fig_1(members: Sequence[TrainedMember], mean_predictor: float) -> str:
-    """Supplement IV, Fig. 1: error and time against depth, a curve a channel set."""
+def fig_1(members: Sequence[TrainedMember], mean_predictor: float, deviation: float) -> str:
+    """Supplement IV, Fig. 1: error and time against depth, a curve a channel set.
+
+    Parameters
+    ----------
+    members
+        The family.
+    mean_predictor
+        Error of the mean on the same test samples [1].
+    deviation
+        Standard deviation of an error from seed to seed, drawn as a bar on each; 0: none [1].
+
+    Returns
+    -------
+    The picture as SVG.
+    """
     with mpl.rc_context(STYLE):
         figure, (errors, times) = _axes(2, 3.0)
         for number, channels in enumerate(sorted({member.channels for member in members})):
@@ -200,7 +214,8 @@ def fig_1(members: Sequence[TrainedMember], mean_predictor: float) -> str:
                 "ms": 4,
             }
             layers = [member.layers for member in own]
-            errors.plot(layers, [member.error for member in own], **line)
+            error = [member.error for member in own]
+            errors.errorbar(layers, error, yerr=deviation or None, capsize=2, **line)
             times.plot(layers, [member.ms_a_grasp for member in own], **line)
         for member in members:
             if member.chosen:

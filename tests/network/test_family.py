@@ -11,6 +11,7 @@ from pipeline.network.family import (
     choose_member,
     list_members,
     multiply_adds,
+    seed_spread,
     standard_error,
 )
 from pipeline.network.ga_cnn import build_network
@@ -19,7 +20,7 @@ OF_RUN = NetworkConfig(layers=52, channels=(64, 128, 256, 512))
 
 
 def test_the_published_comparison_has_over_50_networks_of_18_to_102_layers() -> None:
-    family = list_members(SweepConfig(ablation_seeds=0), OF_RUN, seed=0)
+    family = list_members(SweepConfig(ablation_seeds=0, seeds=1), OF_RUN, seed=0)
     assert len(family) > 50
     assert len({m.name for m in family}) == len(family)
     depths = {m.network.layers for m in family}
@@ -27,6 +28,40 @@ def test_the_published_comparison_has_over_50_networks_of_18_to_102_layers() -> 
     assert max(depths) == 102
     assert len({m.network.channels for m in family}) == 4
     assert OF_RUN in [m.network for m in family]
+
+
+def test_a_quarter_of_the_family_of_all_depths_and_channels_is_trained_with_three_seeds() -> None:
+    members = list_members(SweepConfig(ablation_seeds=0), OF_RUN, seed=7)
+    family = [m for m in members if m.group == "family"]
+    repeats = [m for m in members if m.group == "repeat"]
+    assert len({m.name for m in members}) == len(members)
+    repeated = {m.network for m in repeats}
+    assert 4 * len(repeated) == len(family)
+    assert repeated <= {m.network for m in family}
+    assert sorted(m.seed for m in repeats) == [8] * len(repeated) + [9] * len(repeated)
+    assert {n.channels for n in repeated} == set(SweepConfig().channels)
+    assert {n.layers for n in repeated} == set(SweepConfig().depths)
+
+
+def test_the_spread_of_seeds_is_pooled_within_networks_and_not_between_them() -> None:
+    assert seed_spread([[0.05], [0.06]]) is None
+    spread = seed_spread([[0.1, 0.1 + 2e-3], [0.9, 0.9 + 2e-3], [0.5]])
+    assert spread is not None
+    assert spread.degrees == 2
+    assert spread.deviation == pytest.approx(2e-3 / np.sqrt(2))
+    # 95 % of Student's t with two degrees of freedom lie within 4.303.
+    assert spread.least_difference == pytest.approx(4.303 * 2e-3, rel=1e-3)
+
+
+def test_equal_networks_seldom_differ_by_more_than_the_least_difference() -> None:
+    rng = np.random.default_rng(0)
+    found = []
+    for _ in range(2000):
+        spread = seed_spread(rng.normal(0.05, 1e-3, (4, 3)).tolist())
+        assert spread is not None
+        one, other = rng.normal(0.05, 1e-3, 2)
+        found.append(abs(one - other) > spread.least_difference)
+    assert 0.035 < np.mean(found) < 0.065
 
 
 def test_ablation_leaves_out_one_part_at_a_time() -> None:

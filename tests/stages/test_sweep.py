@@ -19,6 +19,8 @@ SWEEP = """
 [sweep]
 depths = [18, 20]
 channels = [[4, 4, 4, 4], [8, 8, 8, 8]]
+seeds = 2
+seeded_every = 2
 ablation_seeds = 1
 samples = 64
 held_out_samples = 32
@@ -74,6 +76,16 @@ def test_the_summary_has_the_artifacts_figures_and_a_time_each(swept: RunFolder)
         assert row["test_mae"] == network.test_mae
         assert row["ms_a_grasp"] > 0
     assert summary["chosen"] in summary["networks"]
+    told = summary["seeds"]
+    repeats = [n for n in networks if n.group == "repeat"]
+    assert [(n.layers, n.channels[0], n.seed) for n in repeats] == [(18, 4, 5), (20, 8, 5)]
+    assert told["degrees"] == len(repeats)
+    assert 0 < told["deviation"] < told["least_difference"]
+    assert told["pairs"] == 6
+    chosen = summary["chosen"]["test_mae"]
+    worse = [n for n in networks if n.group == "family"]
+    worse = [n for n in worse if n.test_mae - chosen > told["least_difference"]]
+    assert len(told["worse_than_chosen"]) == len(worse)
     assert set(summary["ablation"]) == {"ga-cnn", "no attention", "no augmentation"}
 
 
