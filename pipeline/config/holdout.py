@@ -22,6 +22,13 @@ class HoldoutConfig(Section):
     policies: tuple[PolicyName, ...] = Field(
         ("closed-loop",), min_length=1, description="policies that empty the clutters"
     )
+    ceiling_poses: int = Field(
+        0,
+        ge=0,
+        le=100_000,
+        description="evaluate.ceiling.poses of these clutters: what of the meshes can be lifted "
+        "at all, at several times the time; 0: not told",
+    )
     baseline_grasps: int = Field(
         1000, ge=0, description="of the grasps, those that the released baseline is asked for too"
     )

@@ -76,6 +76,9 @@ def holdout_config(config: RunConfig) -> RunConfig:
                 update={
                     "split": "test",
                     "policies": wanted.policies,
+                    "ceiling": config.evaluate.ceiling.model_copy(
+                        update={"poses": wanted.ceiling_poses}
+                    ),
                     "imperfection": config.evaluate.imperfection.model_copy(update={"curve": ()}),
                 }
             ),

@@ -11,6 +11,7 @@ import pytest
 
 import stages.holdout
 from pipeline.config import load_run_config
+from pipeline.config.judged import holdout_config
 from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder
 from pipeline.network.sources import RELEASED
@@ -44,6 +45,15 @@ def test_every_object_is_for_test_and_nothing_of_the_run_is_made(made: RunFolder
     assert config.scenes.splits == ("test",)
     assert config.scenes.levels == tuple(range(1, 10))
     assert [path.name for path in made.path.parent.iterdir()] == ["holdout"]
+
+
+def test_what_tells_of_policies_and_not_of_meshes_is_left_out(made: RunFolder) -> None:
+    config = load_run_config(ROOT / "runs" / "paper" / "run.toml")
+    assert config.evaluate.ceiling.poses > 0
+    own = holdout_config(config)
+    assert own.evaluate.imperfection.curve == ()
+    assert own.evaluate.ceiling.poses == config.holdout.ceiling_poses == 0
+    assert load_run_config(made.config).evaluate.policies == ("closed-loop",)
 
 
 def test_figures_are_of_one_prediction_and_of_eight(made: RunFolder) -> None:
