@@ -16,7 +16,7 @@ from pipeline.artifacts import publish_bytes
 from pipeline.benchmarks import clutter, control, inference, labelling, loading, solvers, storage
 from pipeline.benchmarks.commits import against_older
 from pipeline.benchmarks.cutting import cutting_time
-from pipeline.benchmarks.shuffling import shuffle_peaks
+from pipeline.benchmarks.shuffling import shuffle_costs
 from pipeline.config import RunConfig, load_run_config
 from pipeline.execution import RunFolder, generator, run_command, run_in_order
 from pipeline.geometry.catalogue import CatalogueObject
@@ -73,7 +73,7 @@ def measure_all() -> None:
         lambda: scaling(bench),
         lambda: storage.figures(samples),
         lambda: loading.figures(samples),
-        shuffle_peaks,
+        shuffle_costs,
         lambda: inference.figures(config.network, samples),
         lambda: control.figures(scene, bench.meshes, config),
         lambda: clutter.figures(bench.objects.values(), config.scenes),

@@ -1,7 +1,8 @@
 """Stage 4, shards: labelled grasps → shuffled train, val and test shards, split by object.
 
 Samples are shuffled in two passes (pipeline/network/shuffling), each in as many processes as there
-are: first grasps are scattered to parts, then each part is permuted and becomes some shards.
+are: first grasps are scattered to parts, then each part is permuted and becomes some shards. Who
+writes a part writes its rows for `make query` too, so that the check reads no sample back.
 """
 
 import shutil
@@ -12,6 +13,7 @@ import numpy as np
 
 from pipeline.artifacts.room import require_room
 from pipeline.artifacts.sharding import is_current, write_index
+from pipeline.asking.cache import QUERY_CACHE, keep_rows
 from pipeline.errors import ArtifactError
 from pipeline.execution import StageContext, Summary, progress, run_in_order, stage_command
 from pipeline.execution.shuffle_plan import Part, ShufflePlan, plan_shuffle
@@ -41,6 +43,7 @@ def build(stage: StageContext) -> Summary:
             stage.config,
             stage.provenance(),
             stage.output.parent,
+            scattered(stage) / f"{part.number:05d}.arrow",
         )
         for part in plan.parts
     ]
@@ -49,6 +52,10 @@ def build(stage: StageContext) -> Summary:
     entries = [entry for found in gathered for entry in found.entries]
     histogram = np.sum([found.quality for found in gathered], axis=0)
     write_index(stage.output, stage.provenance(), entries, histogram)
+    rows = [job.rows for job in jobs]
+    with stage.checking.running():
+        keep_rows("samples", stage.output, stage.folder.state(QUERY_CACHE), rows)
+    stage.checking.seconds += sum(found.rows_s for found in gathered)
     shutil.rmtree(scattered(stage).parent)
     return summary(plan.parts, gathered, names)
 

@@ -1,12 +1,15 @@
-"""Tables as Arrow files in a run's state, each by the digest of the artifact that it was read from.
+"""Tables as Arrow files in a run's state, each in a folder by the digest of its artifact.
 
-An artifact is read once; from then on a question maps the file and touches only the columns that
-it names. While a stage is made anew its artifact, the index last of all, stays as it was, and so
-does the table: what is asked meanwhile is the last whole state. `make prune` frees the files.
+An artifact is read once, or not at all where those who wrote it wrote its rows too; from then on a
+question maps the files and touches only the columns that it names. While a stage is made anew its
+artifact, the index last of all, stays as it was, and so does the table: what is asked meanwhile is
+the last whole state. `make prune` frees the files.
 """
 
 import hashlib
-from collections.abc import Iterator
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Self
 
@@ -15,19 +18,19 @@ import pyarrow as pa
 from filelock import FileLock
 
 from pipeline.artifacts.digests import content_digests
-from pipeline.artifacts.publishing import published
+from pipeline.artifacts.publishing import published, scratch_beside
 from pipeline.asking.columns import NONE, Part, Values, Words
 from pipeline.errors import ArtifactError
 from schemas.tables import BY_NAME, TEXT, Column, Table
 
 QUERY_CACHE = "query"  # in the run's state
-CACHE_VERSION = 2  # rises whenever rows are made in another way
+CACHE_VERSION = 3  # rises whenever rows are made in another way
 BATCH_ROWS = 1 << 16  # beside so many rows, what a batch costs by itself does not count
 DIGITS = 16  # of a digest: enough to tell the artifacts of one run apart
 
 
 def arrow_table(name: str, artifact: Path, cache: Path) -> pa.Table:
-    """A table of a run, mapped from its file; read from the artifact first where there is none.
+    """A table of a run, mapped from its files; read from the artifact first where there are none.
 
     Parameters
     ----------
@@ -36,7 +39,7 @@ def arrow_table(name: str, artifact: Path, cache: Path) -> pa.Table:
     artifact
         The artifact that holds its rows.
     cache
-        Folder of the Arrow files; files of former artifacts are removed.
+        Folder of the tables; those of former artifacts are removed.
 
     Returns
     -------
@@ -47,27 +50,75 @@ def arrow_table(name: str, artifact: Path, cache: Path) -> pa.Table:
     ArtifactError
         The artifact is damaged, of another version, or its shards are being made anew.
     """
-    cache.mkdir(parents=True, exist_ok=True)
-    with FileLock(cache / f"{name}.lock"):
-        path = _file_of(name, artifact, cache)
-        if not path.is_file():
+    with _held(name, cache):
+        folder = _folder_of(name, artifact, cache)
+        if not folder.is_dir():
             # What reads messages takes seconds to load, and most questions find their tables made.
             from pipeline.asking.rows import ROWS
 
-            with published(path) as scratch:
-                write_rows(scratch, BY_NAME[name], ROWS[name](artifact))
-            for older in cache.glob(f"{name}-*.arrow"):
-                if older != path:
-                    older.unlink()
-    return pa.ipc.open_file(pa.memory_map(str(path))).read_all()
+            with _made_whole(folder, name) as scratch, published(_part(scratch, 0)) as file:
+                write_rows(file, BY_NAME[name], ROWS[name](artifact))
+        parts = sorted(folder.iterdir())
+    return pa.concat_tables([pa.ipc.open_file(pa.memory_map(str(p))).read_all() for p in parts])
 
 
-def _file_of(name: str, artifact: Path, cache: Path) -> Path:
-    """The Arrow file of a table, by the artifact's content and the columns as they are now."""
+def keep_rows(name: str, artifact: Path, cache: Path, files: Sequence[Path]) -> None:
+    """Take over the rows of an artifact from those who wrote it, so that nobody reads it for them.
+
+    Parameters
+    ----------
+    name
+        Of the table.
+    artifact
+        The finished artifact.
+    cache
+        Folder of the tables, on the same disk as the files; tables of former artifacts are removed.
+    files
+        Arrow files of its rows in order, by `RowsFile`; they are moved.
+    """
+    with _held(name, cache):
+        folder = _folder_of(name, artifact, cache)
+        if not folder.is_dir():
+            with _made_whole(folder, name) as scratch:
+                for number, file in enumerate(files):
+                    file.rename(_part(scratch, number))
+
+
+@contextmanager
+def _held(name: str, cache: Path) -> Iterator[None]:
+    """One process at a time makes a table."""
+    cache.mkdir(parents=True, exist_ok=True)
+    with FileLock(cache / f"{name}.lock"):
+        yield
+
+
+@contextmanager
+def _made_whole(folder: Path, name: str) -> Iterator[Path]:
+    """A scratch folder that becomes the table's; its former folders are removed."""
+    scratch = scratch_beside(folder)
+    try:
+        scratch.mkdir()
+        yield scratch
+        scratch.rename(folder)
+        for older in folder.parent.glob(f"{name}-*"):
+            if older.is_file():  # of a version that kept a table in one file
+                older.unlink()
+            elif older != folder:
+                shutil.rmtree(older)
+    finally:  # whatever happens, an interrupt included
+        shutil.rmtree(scratch, ignore_errors=True)
+
+
+def _part(folder: Path, number: int) -> Path:
+    return folder / f"{number:05d}.arrow"
+
+
+def _folder_of(name: str, artifact: Path, cache: Path) -> Path:
+    """The folder of a table, by the artifact's content and the columns as they are now."""
     digest = content_digests({name: artifact}, cache / f"{name}.digest.json")[name]
     described = repr((CACHE_VERSION, BY_NAME[name])).encode()
     version = hashlib.sha256(described).hexdigest()[:DIGITS]
-    return cache / f"{name}-{digest[:DIGITS]}-{version}.arrow"
+    return cache / f"{name}-{digest[:DIGITS]}-{version}"
 
 
 def write_rows(path: Path, table: Table, parts: Iterator[Part]) -> None:

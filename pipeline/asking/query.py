@@ -92,11 +92,9 @@ def open_tables(
     OpenTables
         What answers them.
     """
-    with duckdb.connect() as connection:
-        # A name in SQL is a table or a file, never a variable of this program.
-        connection.execute("SET python_enable_replacements = false")
-        # The order in which several threads add up shows in the last digits of a mean.
-        connection.execute("SET threads = 1")
+    # A name in SQL is a table or a file, never a variable of this program. And the order in which
+    # several threads add up shows in the last digits of a mean.
+    with duckdb.connect(config={"python_enable_replacements": False, "threads": 1}) as connection:
         connection.execute("SET VARIABLE stage = $stage", {"stage": stage})
         yield OpenTables(connection, artifacts, cache)
 

@@ -1,5 +1,6 @@
-"""Memory of stage shards over the number of samples, on grasps that a generator writes."""
+"""What stage shards and its check cost over the number of samples, on grasps of random numbers."""
 
+import json
 import os
 import subprocess
 import sys
@@ -11,9 +12,11 @@ from scipy.spatial.transform import Rotation
 
 from pipeline.artifacts import ArtifactWriter
 from pipeline.artifacts.sharding import shard_entry, shard_path, write_index
+from pipeline.asking.cache import QUERY_CACHE, arrow_table
 from pipeline.benchmarks.storage import BATCH, PROVENANCE
 from pipeline.clutter.levels import LEVELS
 from pipeline.config.grasps import CELL_SIDE
+from pipeline.execution.stage import RunFolder
 from pipeline.labelling.balancing import TENTHS
 from pipeline.labelling.grasps import GraspOrigin, LabelledGrasps
 from pipeline.labelling.sampling import Proposal
@@ -31,13 +34,17 @@ OBJECTS = 10  # in a scene
 LIMITS = 8  # of Eq. (8)-(11)
 
 
-def shuffle_peaks() -> dict[str, object]:
-    """Peak memory [MiB] of the processes of stage shards, by number of samples."""
-    return {"shuffle_peak_mib": {str(samples): round(peak_mib(samples)) for samples in SAMPLES}}
+def shuffle_costs() -> dict[str, object]:
+    """Peak memory of stage shards [MiB], and its check's share of its time, by samples."""
+    found = {str(samples): shuffle_cost(samples) for samples in SAMPLES}
+    return {
+        "shuffle_peak_mib": {samples: round(peak_mib) for samples, (peak_mib, _) in found.items()},
+        "shards_check_share": {samples: share for samples, (_, share) in found.items()},
+    }
 
 
-def peak_mib(samples: int, settings: str = "", workers: int = 1) -> float:
-    """Peak memory of the largest process of stage shards [MiB].
+def shuffle_cost(samples: int, settings: str = "", workers: int = 1) -> tuple[float, float]:
+    """Peak memory of the largest process of stage shards, and what its check costs.
 
     Parameters
     ----------
@@ -50,7 +57,7 @@ def peak_mib(samples: int, settings: str = "", workers: int = 1) -> float:
 
     Returns
     -------
-    The peak, recording included.
+    The peak, recording included [MiB], and the check's share of the stage's processor time [1].
 
     Raises
     ------
@@ -59,16 +66,18 @@ def peak_mib(samples: int, settings: str = "", workers: int = 1) -> float:
     """
     with tempfile.TemporaryDirectory(dir=os.environ.get("TMPDIR")) as scratch:
         folder = Path(scratch) / "shuffle"
-        write_synthetic_grasps(folder, samples)
+        grasps = write_synthetic_grasps(folder, samples)
+        arrow_table("grasps", grasps, RunFolder(folder).state(QUERY_CACHE))  # as stage grasps does
         (folder / "run.toml").write_text(settings)
         command = [sys.executable, "-m", "stages.shards", "--run", folder.name]
         command += ["--runs-dir", scratch, "--workers", str(workers)]
         process = subprocess.Popen(command)
         _, status, used = os.wait4(process.pid, 0)  # its own peak and that of its workers
         process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode:
-        raise RuntimeError(f"stage shards ended with {process.returncode}")
-    return used.ru_maxrss / 1024
+        if process.returncode:
+            raise RuntimeError(f"stage shards ended with {process.returncode}")
+        share = json.loads(RunFolder(folder).summary("shards").read_text())["expectations_share"]
+    return used.ru_maxrss / 1024, float(share)
 
 
 def write_synthetic_grasps(

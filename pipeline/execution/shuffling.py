@@ -12,7 +12,10 @@ import numpy as np
 from jaxtyping import Int
 
 from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact
+from pipeline.artifacts.publishing import published
 from pipeline.artifacts.sharding import is_current, shard_entry
+from pipeline.asking.cache import write_rows
+from pipeline.asking.label_rows import sample_part
 from pipeline.config import RunConfig
 from pipeline.execution.shuffle_plan import Part, Source, drawn, order_within
 from pipeline.labelling.balancing import TENTHS, quality_histogram
@@ -20,7 +23,9 @@ from pipeline.messages.grasp_samples import read_grasp_samples
 from pipeline.messages.samples import object_names_in, read_numbered, read_samples, write_samples
 from pipeline.network.samples import Samples
 from pipeline.network.shuffling import near_equal_sizes, placed, positions_by_part, positions_in
+from pipeline.stopwatch import Stopwatch
 from schemas.softgrip.v1.grasps_pb2 import ShardEntry
+from schemas.tables import BY_NAME
 
 
 @dataclass(frozen=True)
@@ -43,6 +48,7 @@ class GatherJob:
     config: RunConfig
     provenance: Provenance
     below: Path  # what shards are named by in the index is below this folder
+    rows: Path  # gets the rows of its samples, as `make query` and the stage's check ask them
 
 
 @dataclass(frozen=True)
@@ -53,6 +59,7 @@ class Gathered:
     quality: Int[np.ndarray, " 10"]  # samples by tenth of q
     seen: int  # cells that hold a point
     cells: int
+    rows_s: float  # processor time of writing its rows
 
 
 def scatter_group(job: ScatterJob) -> tuple[str, ...]:
@@ -104,16 +111,20 @@ def pieces_of(job: GatherJob) -> list[tuple[Path, int, int]]:
 
 
 def counted(job: GatherJob, batches: Iterable[Samples]) -> Gathered:
-    """A part's entries in the index, and counts of its samples."""
+    """A part's entries in the index, and counts of its samples; their rows are written."""
     quality, seen, cells = np.zeros(TENTHS, dtype=np.int64), 0, 0
+    rows, first, split, writing = [], job.part.first, job.part.split, Stopwatch()
     for batch in batches:
         quality += quality_histogram(batch.quality.astype(np.float64))
         seen += int(np.count_nonzero(batch.cloud_mask))
         cells += batch.cloud_mask.size
-    entries = [
-        shard_entry(path, job.below, size, job.part.split) for path, _, size in pieces_of(job)
-    ]
-    return Gathered(entries, quality, seen, cells)
+        with writing.running():
+            rows.append(sample_part(batch, job.names, split, first))
+        first += len(batch)
+    with writing.running(), published(job.rows) as scratch:
+        write_rows(scratch, BY_NAME["samples"], iter(rows))
+    entries = [shard_entry(path, job.below, size, split) for path, _, size in pieces_of(job)]
+    return Gathered(entries, quality, seen, cells, writing.seconds)
 
 
 def read_shard(path: Path) -> Iterator[Samples]:

@@ -135,6 +135,8 @@ class StageContext:
         How long a work item may take in a worker before it is said to hang [s].
     drawing
         Processor time that the recording costs.
+    checking
+        Processor time that checking what is expected costs, wherever it is spent.
     expectations
         What was expected of the finished artifact and what was found, Markdown; empty where nothing
         was checked.
@@ -150,7 +152,8 @@ class StageContext:
     mesh_dir: Path | None
     executor: Executor = "local"
     item_limit_s: float = math.inf
-    drawing: Stopwatch = field(default_factory=Stopwatch)  # what its recording costs
+    drawing: Stopwatch = field(default_factory=Stopwatch)
+    checking: Stopwatch = field(default_factory=Stopwatch)
     expectations: str = ""
 
     @property

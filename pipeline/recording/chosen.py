@@ -27,6 +27,8 @@ from pipeline.world.posed_bodies import bodies_at_rest, surfaces_at_rest
 from pipeline.world.scene import PlacedObject
 from schemas.softgrip.v1.evaluation_pb2 import Attempt
 
+ANSWERED = "in the order of the answer"
+
 
 @dataclass(frozen=True)
 class Chosen:
@@ -56,7 +58,7 @@ class Chosen:
 def draw_chosen_grasps(
     chosen: Chosen, artifacts: Mapping[str, Path], grasps: Sequence[tuple[str, int]]
 ) -> None:
-    """Draw grasps, their pads draped again, from the best to the worst.
+    """Draw grasps, their pads draped again, in the order given.
 
     Parameters
     ----------
@@ -72,17 +74,19 @@ def draw_chosen_grasps(
     by_scene: dict[str, list[int]] = {}
     for scene, number in grasps:
         by_scene.setdefault(scene, []).append(number)
-    shown: list[ShownGrasp] = []
+    shown: dict[tuple[str, int], ShownGrasp] = {}
     for scene, numbers in by_scene.items():
         if scene not in placements:
             raise ArtifactError(f"There is no scene '{scene}'", "Ask for scenes of this run")
         position = list(placements).index(scene)
         shard = artifacts["grasps"].parent / read_index(artifacts["grasps"]).shards[position].path
-        shown += _close_ups(shard, scene, placements[scene], numbers, meshes, chosen.config)
-    quality = np.array([one.grasps.quality[one.row] for one in shown])
-    with recording(chosen, close_ups.blueprint()) as stream:
+        found = _close_ups(shard, scene, placements[scene], numbers, meshes, chosen.config)
+        shown |= {(scene, number): one for number, one in zip(numbers, found, strict=True)}
+    ordered = [shown[grasp] for grasp in grasps]
+    quality = np.array([one.grasps.quality[one.row] for one in ordered])
+    with recording(chosen, close_ups.blueprint(ANSWERED, "Of these")) as stream:
         pad = pad_of(chosen.config.gripper.pad)
-        close_ups.show_grasps(stream, shown, meshes, pad, quality_histogram(quality))
+        close_ups.show_grasps(stream, ordered, meshes, pad, quality_histogram(quality))
 
 
 def _close_ups(

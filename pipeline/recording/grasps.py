@@ -92,7 +92,8 @@ def draw_grasps(stage: FinishedStage, figures: Mapping[str, Any]) -> None:
         shown += shown_grasps(placed, stage.output.parent / index.shards[scene].path)
     with recording(stage, blueprint()) as stream:
         histogram = from_tensor(index.quality_histogram)
-        show_grasps(stream, shown, meshes, pad_of(stage.config.gripper.pad), histogram)
+        ordered = sorted(shown, key=lambda one: -one.grasps.quality[one.row])
+        show_grasps(stream, ordered, meshes, pad_of(stage.config.gripper.pad), histogram)
 
 
 def shown_grasps(placed: tuple[PlacedObject, ...], shard: Path) -> list[ShownGrasp]:
@@ -110,8 +111,20 @@ def shown_grasps(placed: tuple[PlacedObject, ...], shard: Path) -> list[ShownGra
     return shown
 
 
-def blueprint() -> rrb.Blueprint:
-    """Opens on the best grasp: the pad on its object beside figures and limits."""
+def blueprint(order: str = "best to worst", counted: str = "All labels") -> rrb.Blueprint:
+    """Opens on the first grasp: the pad on its object beside figures and limits.
+
+    Parameters
+    ----------
+    order
+        In which order they are shown, in words.
+    counted
+        What the histogram counts, in words.
+
+    Returns
+    -------
+    The blueprint.
+    """
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Spatial3DView(
@@ -124,8 +137,8 @@ def blueprint() -> rrb.Blueprint:
                 rrb.BarChartView(
                     origin="/curves/limits", name="Share used of the limits of F_x, F_y, F_z, T_z"
                 ),
-                rrb.TimeSeriesView(origin="/curves/label", name="q and p, best to worst"),
-                rrb.BarChartView(origin="/curves/quality", name="All labels, q in tenths"),
+                rrb.TimeSeriesView(origin="/curves/label", name=f"q and p, {order}"),
+                rrb.BarChartView(origin="/curves/quality", name=f"{counted}, q in tenths"),
                 row_shares=[3, 2, 2, 2],
             ),
             column_shares=[3, 2],
@@ -137,16 +150,15 @@ def blueprint() -> rrb.Blueprint:
 
 def show_grasps(
     stream: rr.RecordingStream,
-    grasps: Sequence[ShownGrasp],
+    ordered: Sequence[ShownGrasp],
     meshes: Mapping[str, Mesh],
     pad: Pad,
     histogram: Int[np.ndarray, " tenths"],
 ) -> None:
-    """Log the grasps from the best to the worst; ``histogram`` counts q of all in tenths."""
+    """Log the grasps in the order given; ``histogram`` counts q in tenths."""
     stream.log("curves/quality", rr.BarChart(histogram), static=True)
     name_curve(stream, "curves/label/q", "q", colours.PALETTE[2])
     name_curve(stream, "curves/label/p", "p", colours.PALETTE[1])
-    ordered = sorted(grasps, key=lambda shown: -shown.grasps.quality[shown.row])
     names = {placed.object_name for shown in ordered for placed in shown.placed}
     corners = {name: meshes[name].vertices_m for name in names}
     boxes = {name: np.array([v.min(axis=0), v.max(axis=0)]) for name, v in corners.items()}

@@ -135,7 +135,7 @@ def test_a_run_that_is_written_meanwhile_gives_its_last_whole_state(
     shutil.rmtree(tmp_path / "grasps")
     after = ask(sql, {"grasps": grasps_run(tmp_path, other, [8, 3])}, tmp_path / "tables")
     assert after.column("n").to_pylist() == [11]
-    assert len(list((tmp_path / "tables").glob("grasps-*.arrow"))) == 1
+    assert len(list((tmp_path / "tables").glob("grasps-*"))) == 1
 
 
 def test_a_file_whose_words_are_gone_is_named(tmp_path: Path, provenance: Provenance) -> None:

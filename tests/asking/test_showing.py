@@ -24,8 +24,11 @@ def notes(recording: Path, entity: str) -> list[str]:
     return found
 
 
-def test_grasps_of_an_answer(made: dict[str, Path], cache: Path, tmp_path: Path) -> None:
-    sql = "SELECT scene, grasp, object, q FROM grasps ORDER BY q DESC LIMIT 2"
+@pytest.mark.parametrize("order", ["q DESC", "q", "grasp, scene"])
+def test_grasps_of_an_answer_in_its_order(
+    order: str, made: dict[str, Path], cache: Path, tmp_path: Path
+) -> None:
+    sql = f"SELECT scene, grasp, object, q FROM grasps ORDER BY {order} LIMIT 2"
     answer = ask(sql, made, cache)
     told = notes(show_answer(answer, made, RunConfig(), tmp_path / "q.rrd"), "/notes/grasp")
     assert len(told) == 2

@@ -3,6 +3,7 @@
 import hashlib
 import pickle
 import shutil
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import fields
 from pathlib import Path
@@ -14,6 +15,10 @@ from scipy.stats import chisquare
 
 from pipeline.artifacts import ArtifactWriter
 from pipeline.artifacts.sharding import listed_shards, read_index
+from pipeline.asking.cache import QUERY_CACHE, arrow_table
+from pipeline.asking.expectations import check_expectations
+from pipeline.asking.query import ask
+from pipeline.asking.rows import ROWS
 from pipeline.benchmarks.shuffling import write_synthetic_grasps
 from pipeline.config import RunConfig
 from pipeline.errors import ArtifactError
@@ -121,6 +126,40 @@ def test_jobs_done_elsewhere_in_any_order_write_the_same_bytes(
     assert not stage.folder.state("shards").exists()
 
 
+def rows_kept(stage: StageContext) -> list[dict[str, object]]:
+    """Table samples as the stage left it, no sample read for it."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(ROWS, "samples", lambda path: pytest.fail(f"{path} is read for its rows"))
+        table = arrow_table("samples", stage.output, stage.folder.state(QUERY_CACHE))
+    rows: list[dict[str, object]] = table.to_pylist()
+    return rows
+
+
+def test_the_rows_that_the_stage_leaves_are_those_of_its_shards(
+    done: StageContext, tmp_path: Path
+) -> None:
+    read_back = arrow_table("samples", done.output, tmp_path / "query").to_pylist()
+    assert len(read_back) == SAMPLES
+    assert rows_kept(done) == read_back
+    # Each part has words of its own, and SQL tells them apart.
+    sql = "SELECT split, object, count(*) AS n FROM samples GROUP BY ALL ORDER BY ALL"
+    answer = ask(sql, {"shards": done.output}, done.folder.state(QUERY_CACHE)).to_pylist()
+    counts = Counter((str(row["split"]), str(row["object"])) for row in read_back)
+    assert {(row["split"], row["object"]): row["n"] for row in answer} == counts
+
+
+def test_its_check_reads_no_sample_back(
+    done: StageContext, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whatever is asked of samples, in one part or many, is answered by the rows that it left."""
+    monkeypatch.setitem(ROWS, "samples", lambda path: pytest.fail(f"{path} is read for rows"))
+    made = {"grasps": done.upstream("grasps"), "shards": done.output}
+    found = check_expectations("shards", (), made, done.folder.state(QUERY_CACHE))
+    assert len(found) > 2
+    assert not [one for one in found if one.problem and one.expected.name != "provenance is whole"]
+    assert done.checking.seconds > 0  # of writing them: it counts as part of the check
+
+
 class KilledError(Exception):
     """In the place of a kill."""
 
@@ -145,6 +184,7 @@ def test_interrupted_it_goes_on_from_what_is_whole(
     again = count_writes(monkeypatch, None)
     shards.build(stage)
     assert digests(stage) == digests(done)
+    assert rows_kept(stage) == rows_kept(done)
     left = [path for path in kept if path.exists()]
     assert all(path.stat().st_mtime_ns == kept[path] for path in left)
     assert len(left) == whole
