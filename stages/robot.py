@@ -14,8 +14,8 @@ from loguru import logger
 
 from pipeline.artifacts import ArtifactWriter
 from pipeline.config.evaluation import PolicyName
-from pipeline.control.attempts import JudgedAttempt
-from pipeline.control.decision import Cause
+from pipeline.control.attempts import JudgedAttempt, failed_seals
+from pipeline.control.decision import Cause, TriedContact
 from pipeline.control.strategies import build_strategy
 from pipeline.errors import CalibrationError
 from pipeline.execution import generator, run_command
@@ -64,9 +64,10 @@ def robot(
     folder = out or RUNS_DIR / run / "robot"
     first = next_number(folder)
     failed_m: list[np.ndarray] = []
+    felt: list[TriedContact] = []
     for number in range(first, first + attempts):
         rng = generator(config.seed, "robot", number)
-        made = try_once(eyes, arm, strategy, config, rng, failed_m)
+        made = try_once(eyes, arm, strategy, config, rng, failed_m, felt)
         path = folder / f"attempt_{number:05d}.mcap"
         message = attempt_message("robot", 0, 0, number, policy, JUDGE, made, config)
         with ArtifactWriter(path, made_from) as artifact:
@@ -75,6 +76,7 @@ def robot(
         if made.cause is Cause.EMPTY_CLOUD:
             break
         failed_m += failed_contacts_m(made)
+        felt += failed_seals(made)
 
 
 def opened_driver(path: Path) -> Driver:

@@ -71,6 +71,11 @@ class CeilingConfig(Section):
     )
     steps: int = Field(2, ge=0, le=100, description="how often poses near the best are judged")
     nearby: int = Field(9, ge=1, le=1000, description="poses judged in each such step")
+    first_that_lifts: bool = Field(
+        False,
+        description="whether the search ends at the first pose that lifts the object: what can be "
+        "lifted is the same, the weight told is then not the greatest",
+    )
 
 
 class HandConfig(ScaledSection):

@@ -102,6 +102,9 @@ class PolicyConfig(ScaledSection):
     another_m: ClassVar[LengthInMetres] = LengthInMetres()
     regrasp_lever_m: ClassVar[LengthInMetres] = LengthInMetres()
     regrasp_radius_m: ClassVar[LengthInMetres] = LengthInMetres()
+    wide_normal_m: ClassVar[LengthInMetres] = LengthInMetres()
+    again_m: ClassVar[LengthInMetres] = LengthInMetres()
+    felt_reach_m: ClassVar[LengthInMetres] = LengthInMetres()
     smoothing_m: ClassVar[LengthInMetres] = LengthInMetres()
     avoid_radius_m: ClassVar[LengthInMetres] = LengthInMetres()
     slip_m: ClassVar[LengthInMetres] = LengthInMetres()
@@ -145,6 +148,19 @@ class PolicyConfig(ScaledSection):
         lt=math.pi / 2,
         description="the same of more_candidates, and of what counts as liftable: a gripper 8 r_G "
         "long then still stands over the table [rad]",
+    )
+    wide_normal_rg: float = Field(
+        1.0,
+        gt=0,
+        description="of half of more_candidates the normal is the mean over this radius, the "
+        "pad's: studs and edges turn the normal of a small neighbourhood away [r_G]",
+    )
+    lean_rad: float = Field(
+        math.radians(20),
+        ge=0,
+        lt=math.pi / 4,
+        description="a wall so much steeper than steepest_rad is approached at that, where "
+        "more_candidates are drawn: a soft pad bends [rad]",
     )
     rate_hz: float = Field(15.0, gt=0, description="closed-loop rate; Supplement VI: 15 [Hz]")
     approach_max_s: float = Field(
@@ -198,6 +214,26 @@ class PolicyConfig(ScaledSection):
     )
     regrasp_radius_rg: float = Field(
         1.0, gt=0, description="how near to the load's centre a regrasp is sought [r_G]"
+    )
+    again_rg: float = Field(
+        0.3, ge=0, description="no other seal is tried nearer to one that failed and was felt [r_G]"
+    )
+    again_rad: float = Field(
+        0.2, ge=0, le=math.pi, description="unless its approach differs by more than this [rad]"
+    )
+    felt_reach_rg: float = Field(
+        0.6,
+        gt=0,
+        description="how far the vacuum felt at a seal tells of others: its weight has fallen to "
+        "exp(-1/2) there [r_G]",
+    )
+    felt_reach_rad: float = Field(
+        0.35, gt=0, le=math.pi, description="the same over the angle between approaches [rad]"
+    )
+    felt_error: float = Field(
+        0.3,
+        gt=0,
+        description="error of ln(vacuum felt, squared) as a measure of the seal [1]",
     )
     new_choices: int = Field(
         2, ge=0, description="how often all is chosen anew where nothing is left near the aim"

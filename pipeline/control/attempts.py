@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from pipeline.control.cloud import DepthPicture
-from pipeline.control.decision import Cause, Decision
+from pipeline.control.decision import Cause, Decision, TriedContact
 from pipeline.control.robot import Eyes
 from pipeline.world.cameras import PinholeCamera
 
@@ -117,6 +117,12 @@ class JudgedAttempt:
     seen: list[SeenPicture] = field(default_factory=list)
     body_id: int = 0
     ceilings_n: dict[int, tuple[float, float]] = field(default_factory=dict)
+
+
+def failed_seals(made: JudgedAttempt) -> list[TriedContact]:
+    """The seals of an attempt that lifted nothing: all but the last one of a success."""
+    tried = made.decision.tried
+    return tried[:-1] if made.cause is Cause.LIFTED else list(tried)
 
 
 class LoggedEyes:

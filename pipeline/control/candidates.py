@@ -26,31 +26,44 @@ class Candidates:
         Origin at the contact, +z out along the mean normal.
     roughness_m
         Root mean square distance of the points around from their plane.
+    normal_radius_m
+        Radius of the neighbourhood that the normal is the mean of.
     """
 
     world_from_contact: Float[np.ndarray, "k 4 4"]
     roughness_m: Float[np.ndarray, " k"]
+    normal_radius_m: Float[np.ndarray, " k"]
 
     def __len__(self) -> int:
         return len(self.roughness_m)
 
     def take(self, chosen: Bool[np.ndarray, " k"] | Int[np.ndarray, " j"]) -> "Candidates":
         """The candidates at the given indices, or where a mask is true."""
-        return Candidates(self.world_from_contact[chosen], self.roughness_m[chosen])
+        return Candidates(
+            self.world_from_contact[chosen],
+            self.roughness_m[chosen],
+            self.normal_radius_m[chosen],
+        )
 
     def joined(self, others: "Candidates") -> "Candidates":
         """These candidates, then others."""
         return Candidates(
             np.concatenate([self.world_from_contact, others.world_from_contact]),
             np.concatenate([self.roughness_m, others.roughness_m]),
+            np.concatenate([self.normal_radius_m, others.normal_radius_m]),
         )
 
 
-_NONE = Candidates(np.empty((0, 4, 4)), np.empty(0))  # no candidate at all
+_NONE = Candidates(np.empty((0, 4, 4)), np.empty(0), np.empty(0))  # no candidate at all
 
 
 def sample_candidates(
-    cloud: Cloud, count: int, radius_m: float, tilt_max_rad: float, rng: np.random.Generator
+    cloud: Cloud,
+    count: int,
+    radius_m: float,
+    tilt_max_rad: float,
+    rng: np.random.Generator,
+    lean_max_rad: float = 0.0,
 ) -> Candidates:
     """Draw contacts at random from the cloud and give each its frame.
 
@@ -66,6 +79,8 @@ def sample_candidates(
         Largest angle between that normal and the vertical [rad]; steeper contacts are left out.
     rng
         Generator of the draw.
+    lean_max_rad
+        How much steeper a surface may be that is approached at ``tilt_max_rad`` all the same [rad].
 
     Returns
     -------
@@ -74,7 +89,8 @@ def sample_candidates(
     if len(cloud) == 0:
         return _NONE
     at = rng.integers(len(cloud), size=count)
-    return candidates_at(cloud, cloud.points_m[at], cloud.eye_m[at], radius_m, tilt_max_rad)
+    contacts, eyes = cloud.points_m[at], cloud.eye_m[at]
+    return candidates_at(cloud, contacts, eyes, radius_m, tilt_max_rad, lean_max_rad)
 
 
 def sample_near(
@@ -85,6 +101,7 @@ def sample_near(
     radius_m: float,
     tilt_max_rad: float,
     rng: np.random.Generator,
+    lean_max_rad: float = 0.0,
 ) -> Candidates:
     """Draw contacts at random near a given one, for corrections during the approach.
 
@@ -104,6 +121,8 @@ def sample_near(
         Largest angle between that normal and the vertical [rad]; steeper contacts are left out.
     rng
         Generator of the draw.
+    lean_max_rad
+        As in `sample_candidates` [rad].
 
     Returns
     -------
@@ -115,7 +134,8 @@ def sample_near(
         return _NONE
     nearest = near[np.argmin(np.linalg.norm(cloud.points_m[near] - contact_m, axis=1))]
     at = np.concatenate([[nearest], rng.choice(near, size=count - 1)])
-    return candidates_at(cloud, cloud.points_m[at], cloud.eye_m[at], radius_m, tilt_max_rad)
+    contacts, eyes = cloud.points_m[at], cloud.eye_m[at]
+    return candidates_at(cloud, contacts, eyes, radius_m, tilt_max_rad, lean_max_rad)
 
 
 def candidates_at(
@@ -124,11 +144,13 @@ def candidates_at(
     eyes_m: Float[np.ndarray, "k 3"],
     radius_m: float,
     tilt_max_rad: float,
+    lean_max_rad: float = 0.0,
 ) -> Candidates:
     """Compute the frame and roughness of each contact, and leave out steep ones.
 
     A contact is moved along its normal onto the plane through the points around it: their mean is
-    nearer to the surface than one noisy point.
+    nearer to the surface than one noisy point. On a surface that is a little too steep, as a wall
+    is, the soft pad makes up for the angle between its normal and the steepest approach.
 
     Parameters
     ----------
@@ -143,6 +165,8 @@ def candidates_at(
         Radius of the neighbourhood that the plane is fitted to [m].
     tilt_max_rad
         Largest angle between normal and vertical [rad].
+    lean_max_rad
+        As in `sample_candidates` [rad].
 
     Returns
     -------
@@ -158,11 +182,22 @@ def candidates_at(
     normals = axes[:, :, 0]
     away = np.einsum("ij,ij->i", normals, eyes - contacts) <= 0
     normals = np.where(away[:, None], -normals, normals)
-    steep = normals[:, 2] < np.cos(tilt_max_rad)
+    steep = normals[:, 2] < np.cos(tilt_max_rad + lean_max_rad)
     height = np.einsum("ij,ij->i", normals, mean - contacts)
-    frames = contact_frames(contacts + height[:, None] * normals, normals, np.zeros(len(normals)))
+    places = contacts + height[:, None] * normals
+    frames = contact_frames(places, _no_steeper(normals, tilt_max_rad), np.zeros(len(normals)))
     roughness = np.sqrt(np.maximum(squared[:, 0], 0.0))
-    return Candidates(frames[~steep], roughness[~steep])
+    fit = ~steep
+    return Candidates(frames[fit], roughness[fit], np.full(int(fit.sum()), radius_m))
+
+
+def _no_steeper(normals: Float[np.ndarray, "k 3"], tilt_max_rad: float) -> Float[np.ndarray, "k 3"]:
+    """Those over the largest tilt [rad], raised to it about a level axis."""
+    level = np.linalg.norm(normals[:, :2], axis=1)
+    steep = normals[:, 2] < np.cos(tilt_max_rad)
+    raised = np.where(steep, np.sin(tilt_max_rad) / np.maximum(level, 1e-12), 1.0)
+    up = np.where(steep, np.cos(tilt_max_rad), normals[:, 2])
+    return np.column_stack([raised[:, None] * normals[:, :2], up])
 
 
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]

@@ -57,6 +57,7 @@ def correct_aim(
         normal_radius_m,
         policy.steepest_rad if is_steep else policy.tilt_max_rad,
         rng,
+        policy.lean_rad if is_steep else 0.0,
     )
     free = free_of_collision(near.world_from_contact, cloud.points_m, config.hand)
     # Near the contact the gripper has no room left to swing round.

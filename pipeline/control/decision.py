@@ -1,5 +1,6 @@
 """The strategy of an attempt, and the record of its decisions and of how it ended."""
 
+import math
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -71,12 +72,15 @@ class TriedContact:
         Depth images by which it was aimed at.
     held
         Whether an object hung on the pad after the first tug.
+    vacuum
+        Largest vacuum felt before that, over the pump's greatest; NaN where nothing measures it.
     """
 
     world_from_contact: Float[np.ndarray, "4 4"]
     quality: float
     pictures: list[DepthPicture]
     held: bool
+    vacuum: float = math.nan
 
 
 @dataclass(eq=False)

@@ -8,13 +8,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from pipeline.config.evaluation import EvaluateConfig
 from pipeline.control.candidates import Candidates, sample_candidates, sample_near
 from pipeline.control.clearance import free_of_collision
 from pipeline.control.cloud import Cloud, DepthPicture, merged_cloud
-from pipeline.control.decision import Cause, Decision, Strategy
+from pipeline.control.decision import Cause, Decision, Strategy, TriedContact
+from pipeline.control.felt import led_by_feeling, tried_already
 from pipeline.control.regrasp import top_of_column_m, worth_with_lever
 from pipeline.control.robot import Eyes, Robot
 from pipeline.control.unseen import unseen_contacts
@@ -41,12 +42,15 @@ class Choice:
         Its frame, shape (4, 4).
     quality
         Its q-hat; 0 where it was not measured.
+    normal_radius_m
+        Radius over which its normal was measured [m]; 0 where it was not.
     unmeasured
         Whether its height is not measured, so that the pad goes down until it touches.
     """
 
     world_from_contact: Pose
     quality: float
+    normal_radius_m: float = 0.0
     unmeasured: bool = False
 
 
@@ -62,6 +66,7 @@ class GlobalPhase:
         normal_radius_m: float,
         rng: np.random.Generator,
         avoid_m: Sequence[Float[np.ndarray, " 3"]],
+        felt: Sequence[TriedContact] = (),
     ) -> None:
         """Store the arguments; no picture is taken yet.
 
@@ -82,6 +87,9 @@ class GlobalPhase:
         avoid_m
             Contacts in WCS that failed in earlier attempts [m], each of shape (3,); places near
             them are tried only where nothing else is left.
+        felt
+            Seals of earlier attempts that failed, and at which the vacuum was felt: the order goes
+            by that, and just these contacts are not tried again while there is another.
         """
         self._eyes = eyes
         self._robot = robot
@@ -90,7 +98,11 @@ class GlobalPhase:
         self._policy = config.policy
         self._normal_radius_m = normal_radius_m
         self._rng = rng
-        self._avoid_m = avoid_m
+        self._felt = list(felt)
+        places = [seal.world_from_contact[:3, 3] for seal in felt]
+        self._avoid_m = [a for a in avoid_m if not any(np.array_equal(a, b) for b in places)]
+        self._free: tuple[Candidates, Float[np.ndarray, " k"]] | None = None
+        self._unmeasured: list[Choice] = []
         self._rejected_m: list[Float[np.ndarray, " 3"]] = []
         self._ranked: list[Choice] = []
 
@@ -123,11 +135,25 @@ class GlobalPhase:
         decision.pictures = pictures
         found, quality = self._rated(cloud, pictures)
         decision.candidates, decision.quality = found.world_from_contact, quality
-        self._ranked = [
-            *self._rank_free(cloud, found, quality, best_first=quality),
-            *self._rank_unmeasured(cloud, unseen),
-        ]
+        free = free_of_collision(found.world_from_contact, cloud.points_m, self._config.hand)
+        self._free = found.take(free), quality[free]
+        self._unmeasured = self._rank_unmeasured(cloud, unseen)
+        self._rank()
         return None if self._ranked else Cause.NO_CANDIDATE
+
+    def feel(self, seal: TriedContact) -> None:
+        """Rank the contacts anew after a seal that failed, by the vacuum that was felt there."""
+        self._felt.append(seal)
+        self._rank()
+
+    def _rank(self) -> None:
+        """Put the contacts in order, the most worth first; those tried already come last."""
+        assert self._free is not None  # a look comes first
+        found, quality = self._free
+        worth = led_by_feeling(found.world_from_contact, quality, self._felt, self._policy)
+        again = tried_already(found.world_from_contact, self._felt, self._policy)
+        order = np.lexsort((-worth, again))
+        self._ranked = [*_choices(found, quality, order), *self._unmeasured]
 
     def best(self, least: float) -> Choice | None:
         """The best reachable contact of at least this quality that was not rejected, or None."""
@@ -198,12 +224,14 @@ class GlobalPhase:
         found = self._without_failed(self._sample(cloud))
         quality = self._ranking(pictures, found) if len(found) else np.empty(0)
         self._robot.think()
-        more = self._policy.more_candidates
+        more, steepest = self._policy.more_candidates, self._policy.steepest_rad
         if more == 0 or quality.max(initial=0.0) >= self._policy.enough_quality:
             return found, quality
         # All are rated again: each is averaged with its neighbours, and now it has some.
-        steepest = self._policy.steepest_rad
-        found = found.joined(self._without_failed(self._sample(cloud, more, steepest)))
+        lean, wide_m = self._policy.lean_rad, self._policy.wide_normal_m
+        for count, radius_m in ((more - more // 2, self._normal_radius_m), (more // 2, wide_m)):
+            some = sample_candidates(cloud, count, radius_m, steepest, self._rng, lean)
+            found = found.joined(self._without_failed(some))
         quality = self._ranking(pictures, found) if len(found) else np.empty(0)
         self._robot.think()
         return found, quality
@@ -263,7 +291,7 @@ class GlobalPhase:
         poses = found.world_from_contact
         free = free_of_collision(poses, cloud.points_m, self._config.hand)
         order = np.argsort(-best_first, kind="stable")
-        return [Choice(poses[i], float(quality[i])) for i in order if free[i]]
+        return _choices(found, quality, order[free[order]])
 
     def _rank_unmeasured(self, cloud: Cloud, contacts: Sequence[Pose]) -> list[Choice]:
         """Unmeasured contacts that the stem can reach without touching a measured point.
@@ -281,12 +309,12 @@ class GlobalPhase:
     def _unseen_contacts(self, pictures: Sequence[DepthPicture]) -> list[Pose]:
         return unseen_contacts(pictures, self._policy.unseen, self._policy.above_table_m)
 
-    def _sample(self, cloud: Cloud, count: int = 0, tilt_max_rad: float = 0.0) -> Candidates:
+    def _sample(self, cloud: Cloud) -> Candidates:
         return sample_candidates(
             cloud,
-            count or self._policy.candidates,
+            self._policy.candidates,
             self._normal_radius_m,
-            tilt_max_rad or self._policy.tilt_max_rad,
+            self._policy.tilt_max_rad,
             self._rng,
         )
 
@@ -316,3 +344,13 @@ class GlobalPhase:
     def _can_reach(self, contact: Pose) -> bool:
         above = back_off(contact, self._policy.standoff_m)
         return self._robot.reachable(above) and self._robot.reachable(contact)
+
+
+def _choices(
+    found: Candidates, quality: Float[np.ndarray, " k"], order: Int[np.ndarray, " j"]
+) -> list[Choice]:
+    """Candidates as choices, in an order."""
+    return [
+        Choice(found.world_from_contact[i], float(quality[i]), float(found.normal_radius_m[i]))
+        for i in order
+    ]

@@ -28,12 +28,16 @@ class LocalPhase:
     ) -> None:
         self._ranking = ranking
         self._config = config
-        self._normal_radius_m = normal_radius_m
+        self._default_radius_m = normal_radius_m
         self._rng = rng
         self.start_over()
 
-    def start_over(self) -> None:
-        """Forget the motion measured so far, because another place is aimed at."""
+    def start_over(self, normal_radius_m: float = 0.0) -> None:
+        """Forget the motion measured so far, because another place is aimed at.
+
+        Normals are measured over the radius by which the place was found [m]; 0: over the usual.
+        """
+        self._normal_radius_m = normal_radius_m or self._default_radius_m
         policy = self._config.policy
         self._motion = Motion(
             1.0 / policy.rate_hz, policy.shown_share * policy.look_m, policy.motion

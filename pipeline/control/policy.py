@@ -45,6 +45,7 @@ class Attempt:
         normal_radius_m: float,
         rng: np.random.Generator,
         avoid_m: Sequence[Float[np.ndarray, " 3"]] = (),
+        felt: Sequence[TriedContact] = (),
     ) -> None:
         """Prepare an attempt; nothing moves yet.
 
@@ -65,6 +66,9 @@ class Attempt:
         avoid_m
             Contacts in WCS that failed in earlier attempts [m], each of shape (3,); places near
             them are tried only where nothing else is left.
+        felt
+            Seals that failed in earlier attempts; where the strategy feels, the vacuum measured
+            there tells of places near them.
         """
         self._eyes = eyes
         self._robot = robot
@@ -73,7 +77,10 @@ class Attempt:
         self._policy = config.policy
         robots = config.imperfection
         self._monitor = WrenchMonitor(config.policy, robots.force_error_n, robots.vacuum_error)
-        self._global = GlobalPhase(eyes, robot, strategy, config, normal_radius_m, rng, avoid_m)
+        told = [seal for seal in felt if self._tells(seal)]
+        self._global = GlobalPhase(
+            eyes, robot, strategy, config, normal_radius_m, rng, avoid_m, told
+        )
         self._local = LocalPhase(strategy.ranking, config, normal_radius_m, rng)
         self._new_choices_left = config.policy.new_choices
         self._retargets_left = config.policy.retargets if strategy.corrects else 0
@@ -238,9 +245,10 @@ class Attempt:
         self._robot.vacuum(on=True)
         self.decision.seals += 1
         start = self._robot.pose()
-        readings = self._raise(start, self._policy.tug_m)
+        still = self._robot.step(start, self._policy.speed_m_s)
+        readings = [still, *self._raise(start, self._policy.tug_m)]
         held = self._monitor.holds(readings[-1])
-        self._remember_try(held)
+        self._remember_try(held, max(reading.pressure for reading in readings))
         if held:
             return None
         self._robot.vacuum(on=False)
@@ -254,13 +262,14 @@ class Attempt:
         self.decision.regrasps += 1
         return self._run_phases(*self._phases_to_seal())
 
-    def _remember_try(self, held: bool) -> None:
+    def _remember_try(self, held: bool, vacuum: float) -> None:
         decision = self.decision
-        decision.tried.append(
-            TriedContact(
-                decision.world_from_contact, decision.predicted_quality, decision.aimed_by, held
-            )
-        )
+        pose, quality = decision.world_from_contact, decision.predicted_quality
+        decision.tried.append(TriedContact(pose, quality, decision.aimed_by, held, vacuum))
+
+    def _tells(self, seal: TriedContact) -> bool:
+        """Whether the vacuum of a seal that failed was felt, and is used."""
+        return self._strategy.feels and not math.isnan(seal.vacuum)
 
     def _aim_nearer(self, felt: Reading) -> bool:
         """Aim at a contact nearer to the object's centre of mass; whether there was one."""
@@ -279,7 +288,11 @@ class Attempt:
 
     def _aim_elsewhere(self) -> bool:
         """Aim at the best contact left, if its q-hat is high enough; whether there was one."""
-        self._global.reject(self.decision.failed_contacts_m)
+        failed = self.decision.tried[-1]
+        if self._tells(failed):
+            self._global.feel(failed)
+        else:
+            self._global.reject(self.decision.failed_contacts_m)
         return self._aim_at(self._global.best(self._policy.regrasp_quality))
 
     def _lift(self) -> Cause | None:
@@ -342,7 +355,7 @@ class Attempt:
             return False
         self._aim(choice.world_from_contact, choice.quality, self.decision.pictures)
         self._aim_unmeasured, self._gain = choice.unmeasured, self._policy.correction_gain
-        self._local.start_over()
+        self._local.start_over(choice.normal_radius_m)
         return True
 
     def _aim(self, pose: Float[np.ndarray, "4 4"], quality: float, by: list[DepthPicture]) -> None:

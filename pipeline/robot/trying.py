@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from pipeline.config import RunConfig
 from pipeline.control.attempts import JudgedAttempt, LoggedEyes
-from pipeline.control.decision import Cause, Decision, Strategy
+from pipeline.control.decision import Cause, Decision, Strategy, TriedContact
 from pipeline.control.policy import Attempt
 from pipeline.control.robot import Eyes
 from pipeline.robot.cell import DrivenRobot
@@ -25,6 +25,7 @@ def try_once(
     config: RunConfig,
     rng: np.random.Generator,
     avoid_m: Sequence[Float[np.ndarray, " 3"]] = (),
+    felt: Sequence[TriedContact] = (),
 ) -> JudgedAttempt:
     """Make one attempt, put down what was lifted, and go home.
 
@@ -42,6 +43,8 @@ def try_once(
         Draws the candidates.
     avoid_m
         Contacts that failed before, in WCS [m], each of shape (3,).
+    felt
+        Seals that failed before.
 
     Returns
     -------
@@ -51,7 +54,7 @@ def try_once(
     robot.begin()
     logged = LoggedEyes(eyes, lambda: len(robot.samples) - 1)
     decision = Attempt(
-        logged, robot, strategy, config.evaluate, config.grasps.normal_radius_m, rng, avoid_m
+        logged, robot, strategy, config.evaluate, config.grasps.normal_radius_m, rng, avoid_m, felt
     ).run()
     made = _judged(decision, robot, logged)
     robot.put_down()

@@ -169,7 +169,8 @@ class Ceilings:
         expected = self._expected_n(tried, poses[body], surfaces)
         apart_m = _APART_RG * self._config.gripper.pad.radius_m
         judged = tried.take(likeliest_apart(tried, expected, wanted.judged, apart_m))
-        borne_n = self._borne_n(judged, poses[body], surfaces)
+        enough_n = weight_n if wanted.first_that_lifts else np.inf
+        borne_n = self._borne_n(judged, poses[body], surfaces, enough_n)
         for _ in range(wanted.steps):
             if not 0.0 < borne_n.max(initial=0.0) < weight_n:
                 break
@@ -178,7 +179,8 @@ class Ceilings:
             near = propose_nearby(surface, origins, _from_all_sides(self._config.grasps), rng)
             near = self._reached(near, surfaces, obstacles_m)
             judged = join_candidates([judged, near])
-            borne_n = np.concatenate([borne_n, self._borne_n(near, poses[body], surfaces)])
+            more_n = self._borne_n(near, poses[body], surfaces, enough_n)
+            borne_n = np.concatenate([borne_n, more_n])
         if not borne_n.any():
             return Best(0.0, weight_n, np.eye(4), len(tried))
         first = int(np.argmax(borne_n))
@@ -227,14 +229,19 @@ class Ceilings:
         )
 
     def _borne_n(
-        self, tried: Candidates, pose: Pose, surfaces: PosedScene
+        self, tried: Candidates, pose: Pose, surfaces: PosedScene, enough_n: float
     ) -> Float[np.ndarray, " n"]:
-        """What the judge finds borne by each [N]; 0 where it holds another body or none."""
+        """What the judge finds borne by each [N]; 0 where it holds another body or none.
+
+        Poses after one that bears ``enough_n`` are not judged, and told as 0.
+        """
         borne_n = np.zeros(len(tried))
         for row, frame in enumerate(tried.world_from_contact):
             found = self._judge.find_seal(frame, surfaces)
             if found is not None and found[0] == tried.body_id[row] and found[1].closes:
                 borne_n[row] = weight_borne_n(found[1], frame, pose[:3, 3], self._config.evaluate)
+            if borne_n[row] >= enough_n:
+                break
         return borne_n
 
 

@@ -1,6 +1,6 @@
 """Emptying one clutter: one attempt after another in one SAPIEN world, each judged by physics."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import sapien
@@ -8,8 +8,8 @@ from jaxtyping import Float
 
 from pipeline.config import RunConfig
 from pipeline.config.evaluation import PolicyName
-from pipeline.control.attempts import JudgedAttempt, LoggedEyes, SeenPicture
-from pipeline.control.decision import Cause, Decision, Strategy
+from pipeline.control.attempts import JudgedAttempt, LoggedEyes, SeenPicture, failed_seals
+from pipeline.control.decision import Cause, Decision, Strategy, TriedContact
 from pipeline.control.policy import Attempt
 from pipeline.control.ranking import Predict
 from pipeline.control.strategies import build_strategy
@@ -81,7 +81,10 @@ class Clutter:
         self.eyes = SimulatedEyes(self.gripper, self.items, config, calibration, rng)
 
     def make_attempt(
-        self, strategy: Strategy, avoid_m: list[Float[np.ndarray, " 3"]]
+        self,
+        strategy: Strategy,
+        avoid_m: list[Float[np.ndarray, " 3"]],
+        felt: Sequence[TriedContact] = (),
     ) -> JudgedAttempt:
         """Make one attempt, judge it, and remove what was lifted or fell off the table.
 
@@ -91,6 +94,8 @@ class Clutter:
             The policy.
         avoid_m
             Contacts that failed before, in WCS [m], each of shape (3,).
+        felt
+            Seals that failed before.
 
         Returns
         -------
@@ -107,6 +112,7 @@ class Clutter:
             self._config.grasps.normal_radius_m,
             self._rng,
             avoid_m,
+            felt,
         ).run()
         made = self._judge(decision, eyes.seen, ceilings_n)
         lifted = {self.gripper.target} if made.cause is Cause.LIFTED else set()
@@ -196,16 +202,18 @@ def run_clutter(
     strategy = build_strategy(policy, predict, config)
     attempts: list[JudgedAttempt] = []
     failed_contacts_m: list[Float[np.ndarray, " 3"]] = []
+    felt: list[TriedContact] = []
     in_a_row = 0
     while (
         clutter.bodies
         and len(attempts) < config.evaluate.attempts_per_clutter
         and in_a_row < config.evaluate.failures_per_clutter
     ):
-        made = clutter.make_attempt(strategy, failed_contacts_m)
+        made = clutter.make_attempt(strategy, failed_contacts_m, felt)
         attempts.append(made)
         # A place that failed is tried again only where no other is left.
         failed_contacts_m += made.decision.failed_contacts_m
+        felt += failed_seals(made)
         if made.cause is Cause.LIFTED:
             in_a_row = 0
         else:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from pipeline.config import EvaluateConfig, RunConfig
 from pipeline.control.candidates import Candidates, candidates_at, sample_near
@@ -33,6 +34,17 @@ def test_approach_is_the_mean_normal_of_a_tilted_plate() -> None:
     np.testing.assert_allclose(found.world_from_contact[0, :3, 3], middle[0], atol=1e-9)
     assert found.roughness_m[0] < 1e-6
     assert len(candidates_at(cloud_of(points), middle, eye, RADIUS_M, tilt_max_rad=0.2)) == 0
+
+
+@pytest.mark.parametrize(("turned_deg", "found"), [(60, 60), (90, 75), (94, 75), (97, None)])
+def test_a_wall_is_approached_as_steeply_as_is_allowed(turned_deg: int, found: int | None) -> None:
+    turn = Rotation.from_euler("y", turned_deg, degrees=True).as_matrix()
+    points, eye = plate(0.0) @ turn.T, np.array([[0.9, 0.0, 0.0]])
+    middle = points[12_960][None]
+    limits = np.radians(75), np.radians(20)
+    some = candidates_at(cloud_of(points), middle, eye, RADIUS_M, *limits).world_from_contact
+    axes = [Rotation.from_euler("y", found, degrees=True).as_matrix()[:, 2]] if found else []
+    np.testing.assert_allclose(some[:, :3, 2], np.reshape(axes, (-1, 3)), atol=1e-6)
 
 
 def test_neighbourhoods_agree_with_numpy() -> None:
@@ -98,7 +110,7 @@ def test_the_geometric_picker_wants_the_pad_on_the_flattest_at_the_top() -> None
     places = np.concatenate([places, [[0.06, 0.0, 0.05]]])
     poses = contact_frames(places, np.tile([0, 0, 1.0], (5, 1)), np.zeros(5))
     ranking = GeometricRanking(CONFIG.policy.picker, run.sensing, run.gripper.pad)
-    value = ranking([seen], Candidates(poses, np.zeros(5)))
+    value = ranking([seen], Candidates(poses, np.zeros(5), np.zeros(5)))
     assert np.argmax(value) == 0
     assert value[0] > 0.9 > value[1] > value[3]  # half of the pad is over nothing, three quarters
     assert value[0] > value[2]  # half of it is over the step
@@ -110,7 +122,7 @@ def test_smoothing_prefers_a_region_to_a_lucky_point() -> None:
     x = np.concatenate([np.arange(5) * 0.002, 0.1 + np.arange(5) * 0.002])
     places = np.column_stack([x, np.zeros(10), np.zeros(10)])
     up = np.tile([0, 0, 1.0], (10, 1))
-    found = Candidates(contact_frames(places, up, np.zeros(10)), np.zeros(10))
+    found = Candidates(contact_frames(places, up, np.zeros(10)), np.zeros(10), np.zeros(10))
     quality = np.array([0.5, 0.5, 0.9, 0.5, 0.5, 0.8, 0.8, 0.8, 0.8, 0.8])
     assert np.argmax(quality) == 2
     assert np.argmax(smooth_quality(found, quality, 0.007, 0.3)) >= 5

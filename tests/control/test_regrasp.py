@@ -44,9 +44,8 @@ def test_the_top_of_a_column_is_its_highest_point() -> None:
 def test_worth_falls_with_the_lever_and_is_nothing_where_little_is_gained() -> None:
     poses = np.tile(np.eye(4), (4, 1, 1))
     poses[:, 0, 3] = 0.0, 0.01, 0.03, 0.05
-    worth = worth_with_lever(
-        np.full(4, 0.8), Candidates(poses, np.zeros(4)), np.zeros(2), 0.05, PolicyConfig()
-    )
+    found = Candidates(poses, np.zeros(4), np.zeros(4))
+    worth = worth_with_lever(np.full(4, 0.8), found, np.zeros(2), 0.05, PolicyConfig())
     assert worth[0] == 0.8
     assert worth[0] > worth[1] > worth[2] > 0.0
     assert worth[3] == 0.0

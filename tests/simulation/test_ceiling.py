@@ -72,6 +72,20 @@ def test_what_is_too_heavy_for_a_full_seal_cannot_be_lifted(heavy: CatalogueObje
     assert 0.9 * middle_n(heavy) < best.borne_n < 1.45 * middle_n(heavy)
 
 
+def test_the_search_may_end_at_the_first_pose_that_lifts(
+    bar: CatalogueObject, heavy: CatalogueObject
+) -> None:
+    ceiling = CONFIG.evaluate.ceiling.model_copy(update={"first_that_lifts": True})
+    evaluate = CONFIG.evaluate.model_copy(update={"ceiling": ceiling})
+    config = CONFIG.model_copy(update={"evaluate": evaluate})
+    first, best = (found(ceilings(bar, config=c), LIES)[1] for c in (config, CONFIG))
+    assert first.lifts
+    assert first.borne_n <= best.borne_n
+    # What no pose lifts is looked for to the end.
+    first, best = (found(ceilings(heavy, config=c), LIES)[1] for c in (config, CONFIG))
+    assert first.borne_n == best.borne_n
+
+
 def test_out_of_reach_nothing_is_borne(bar: CatalogueObject) -> None:
     best = found(ceilings(bar, reachable=False), LIES)[1]
     assert (best.borne_n, best.reached, best.lifts) == (0.0, 0, False)
