@@ -5,7 +5,6 @@ import shutil
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import TypeVar
 
@@ -13,6 +12,7 @@ from google.protobuf.message import Message
 
 from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact
 from pipeline.artifacts.sharding import is_current
+from pipeline.clutter.levels import clutter_number
 from pipeline.config import RunConfig
 from pipeline.config.evaluation import PolicyName
 from pipeline.errors import ArtifactError
@@ -25,11 +25,10 @@ from pipeline.execution import (
     run_in_order,
     stage_command,
 )
-from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.messages.evaluation import attempt_message
 from pipeline.messages.evaluation_curve import curve_figures, curve_of, curve_scenes
 from pipeline.messages.evaluation_results import results_of
-from pipeline.messages.objects import read_objects
+from pipeline.messages.objects import catalogue
 from pipeline.messages.proposed_contacts import contacts_message, proposed_of
 from pipeline.messages.scenes import read_groups, read_scene, read_scenes
 from pipeline.messages.trained import rates_for
@@ -95,13 +94,14 @@ def build(stage: StageContext) -> Summary:
 
 
 def clutters(stage: StageContext) -> list[ClutterScene]:
-    """The clutters of ``evaluate.split``. Raises ArtifactError where there is none."""
-    split = stage.config.evaluate.split
-    scenes = [s for s in read_scenes(stage.upstream("scenes")) if s.split == split]
+    """The clutters that [evaluate] names. Raises ArtifactError where there is none."""
+    split, first = stage.config.evaluate.split, stage.config.evaluate.clutters_from
+    every = [s for s in read_scenes(stage.upstream("scenes")) if s.split == split]
+    scenes = [s for s in every if clutter_number(s.scene_id) >= first]
     if not scenes:
         raise ArtifactError(
-            f"{stage.upstream('scenes')} holds no {split} clutter",
-            f"Give scenes.clutters_per_level.{split} at least one",
+            f"{stage.upstream('scenes')} holds no {split} clutter from number {first} on",
+            f"Give scenes.clutters_per_level.{split} at least {first + 1}",
         )
     return scenes
 
@@ -175,12 +175,6 @@ def contacts_at(job: ClutterJob) -> list[ProposedContacts]:
     rng = generator(job.config.seed, "evaluate contacts", job.scene.scene_id)
     found = propose_contacts(job.scene, meshes, network, analytic, job.config, rng)
     return [contacts_message(job.scene, found)]
-
-
-@lru_cache(maxsize=1)
-def catalogue(objects: Path) -> dict[str, tuple[CatalogueObject, str]]:
-    """The object catalogue, read once a worker."""
-    return read_objects(objects)
 
 
 def made_in(jobs: Sequence[ClutterJob], kind: type[M]) -> list[M]:

@@ -21,6 +21,7 @@ from pipeline.config.judged import judged_config
 from pipeline.config.written import as_toml
 from pipeline.execution import RunFolder, generator, progress, run_command, run_in_order
 from pipeline.messages.grasp_columns import GraspColumns, read_columns
+from pipeline.messages.objects import catalogue
 from pipeline.messages.scenes import read_placed
 from pipeline.messages.trained import SCORE_THREADS, control_predictor
 from pipeline.network.analytic import fit_analytic
@@ -33,7 +34,6 @@ from pipeline.referee.seal import referee_of
 from pipeline.reporting.agreement import as_csv, as_markdown
 from pipeline.reporting.plots import load_by_quality
 from pipeline.world.scene import PlacedObject
-from stages.evaluate import catalogue
 from stages.graph import RUNS_DIR
 
 NAME = "referee"

@@ -42,3 +42,8 @@ def level_of(level: int) -> tuple[ShapeClass, Distribution]:
 def clutter_ids(level: int, split: str, count: int) -> list[str]:
     """Names of the first clutters of a level that are built of a split's objects."""
     return [f"level{level}-{split}-{number:02d}" for number in range(count)]
+
+
+def clutter_number(clutter_id: str) -> int:
+    """Number of a clutter among those of its level and split, from 0; the inverse of its name."""
+    return int(clutter_id.rsplit("-", 1)[1])

@@ -187,6 +187,12 @@ class EvaluateConfig(Section):
     split: Literal["test", "val"] = Field(
         "test", description="whose clutters are picked; choices are made on val"
     )
+    clutters_from: int = Field(
+        0,
+        ge=0,
+        description="number of the first clutter of each level that is picked: those before it "
+        "were looked at while the policy was made",
+    )
     policies: tuple[PolicyName, ...] = Field(
         ("closed-loop", "analytic", "uncorrected", "one-seal", "open-loop", "geometric"),
         min_length=1,

@@ -262,7 +262,7 @@ class PolicyConfig(ScaledSection):
         1.0, ge=0, description="a pull is at least so many spreads of a force that is read [1]"
     )
     vacuum_min: float = Field(
-        0.01,
+        0.005,
         gt=0,
         le=1,
         description="least vacuum over the pump's greatest that tells a held object, where the "
@@ -272,7 +272,10 @@ class PolicyConfig(ScaledSection):
         3.0, ge=0, description="and it is at least so many spreads of a vacuum that is read [1]"
     )
     loss_readings: int = Field(
-        2, ge=1, description="readings in a row that show no object before it counts as lost"
+        4,
+        ge=1,
+        description="readings in a row that show no object before it counts as lost, and readings "
+        "that the vacuum is the mean of where one is in doubt",
     )
     trim_sigmas: float = Field(
         2.0, ge=0, description="a moment that the lift tilts for is at least so many spreads [1]"

@@ -16,6 +16,7 @@ is left; the gripper then goes straight down until contact.
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
@@ -247,7 +248,7 @@ class Attempt:
         start = self._robot.pose()
         still = self._robot.step(start, self._policy.speed_m_s)
         readings = [still, *self._raise(start, self._policy.tug_m)]
-        held = self._monitor.holds(readings[-1])
+        held = self._holds(readings[-1])
         self._remember_try(held, max(reading.pressure for reading in readings))
         if held:
             return None
@@ -261,6 +262,15 @@ class Attempt:
         self._regrasps_left -= 1
         self.decision.regrasps += 1
         return self._run_phases(*self._phases_to_seal())
+
+    def _holds(self, reading: Reading) -> bool:
+        """Whether an object is held; where a reading does not tell, by the mean of more."""
+        if self._monitor.holds(reading) or math.isnan(reading.pressure):
+            return self._monitor.holds(reading)
+        here, more = self._robot.pose(), self._policy.loss_readings
+        still = [self._robot.step(here, self._policy.speed_m_s) for _ in range(more)]
+        vacuum = float(np.mean([reading.pressure for reading in still]))
+        return self._monitor.holds(replace(still[-1], pressure=vacuum), more)
 
     def _remember_try(self, held: bool, vacuum: float) -> None:
         decision = self.decision
@@ -322,12 +332,12 @@ class Attempt:
 
     def _shake(self) -> Cause | None:
         reading = self._robot.shake()
-        return None if self._monitor.holds(reading) else Cause.LOST_IN_SHAKE
+        return None if self._holds(reading) else Cause.LOST_IN_SHAKE
 
     def _transport(self) -> Cause | None:
         """Carry the object aside and back at each acceleration, one after the other."""
         for acceleration_m_s2 in self._config.transport.accelerations_m_s2:
-            if not self._monitor.holds(self._robot.carry(acceleration_m_s2)):
+            if not self._holds(self._robot.carry(acceleration_m_s2)):
                 return Cause.LOST_IN_TRANSPORT
             self.decision.carried_m_s2 = acceleration_m_s2
         return None

@@ -7,6 +7,8 @@ where a sensor tells the vacuum at the pad, that decides.
 """
 
 import math
+from collections import deque
+from dataclasses import replace
 from enum import StrEnum
 
 import numpy as np
@@ -50,9 +52,10 @@ class WrenchMonitor:
         self._contact_n = max(config.contact_n, config.contact_sigmas * error_n)
         self._tension_n = max(config.tension_min_n, config.tension_sigmas * error_n)
         self._sure_n = max(config.tension_min_n, config.contact_sigmas * error_n)
-        self._vacuum = max(config.vacuum_min, config.vacuum_sigmas * vacuum_error)
+        self._vacuum_error = vacuum_error
         self._line: Float[np.ndarray, " 3"] | None = None
         self._missed = 0
+        self._vacuum: deque[float] = deque(maxlen=config.loss_readings)
 
     def moving(self, reading: Reading) -> Event:
         """The event of a reading in free space or during the approach."""
@@ -64,15 +67,31 @@ class WrenchMonitor:
             return Event.CONTACT
         return Event.NOTHING
 
-    def holds(self, reading: Reading) -> bool:
+    def holds(self, reading: Reading, readings: int = 1) -> bool:
         """Whether an object is held (grasp success): the vacuum shows it, or its pull.
 
         Without a sensor of the vacuum, a pull that is likely an object's is enough. With one, an
         open pad tells that nothing is held, unless the pull is sure: what leaks much may be heavy.
+
+        Parameters
+        ----------
+        reading
+            What was felt.
+        readings
+            How many readings its vacuum is the mean of: the more, the less of it is noise.
+
+        Returns
+        -------
+        False where nothing tells an object.
         """
         if math.isnan(reading.pressure):
             return self.pulls(reading)
-        return reading.pressure >= self._vacuum or hanging_n(reading) >= self._sure_n
+        return reading.pressure >= self._least(readings) or hanging_n(reading) >= self._sure_n
+
+    def _least(self, readings: int) -> float:
+        """The vacuum that a mean of so many readings must show."""
+        error = self._vacuum_error / math.sqrt(readings)
+        return max(self._config.vacuum_min, self._config.vacuum_sigmas * error)
 
     def pulls(self, reading: Reading) -> bool:
         """Whether the wrench alone tells an object: where its load hangs can be told then."""
@@ -80,7 +99,7 @@ class WrenchMonitor:
 
     def carrying(self, reading: Reading) -> Event:
         """The event of a reading while an object is held: lost, or slipped under the pad."""
-        if not self.holds(reading):
+        if not self._still_holds(reading):
             self._missed += 1
             return Event.LOSS if self._missed >= self._config.loss_readings else Event.NOTHING
         self._missed = 0
@@ -90,6 +109,12 @@ class WrenchMonitor:
         if before is not None and np.linalg.norm(self._line - before) > self._config.slip_m:
             return Event.SLIP
         return Event.NOTHING
+
+    def _still_holds(self, reading: Reading) -> bool:
+        """The same of what was held before: by the mean vacuum of the last readings."""
+        self._vacuum.append(reading.pressure)
+        mean = float(np.mean(self._vacuum))
+        return self.holds(replace(reading, pressure=mean), len(self._vacuum))
 
 
 def hanging_n(reading: Reading) -> float:

@@ -74,6 +74,18 @@ def test_an_object_too_light_for_the_wrench_is_felt_by_the_vacuum() -> None:
     assert events[-1] is Event.LOSS
 
 
+def test_a_faint_vacuum_is_told_by_more_readings() -> None:
+    """The seal of a light object on studs: three sigma of four readings' mean, not of one."""
+    vacuum_error, light = 0.02, np.array([0.0, 0.0, -0.001])
+    monitor = WrenchMonitor(CONFIG, 0.15, vacuum_error)
+    faint = 0.6 * CONFIG.vacuum_sigmas * vacuum_error
+    assert not monitor.holds(reading(light, pressure=faint))
+    assert monitor.holds(reading(light, pressure=faint), readings=4)
+    # While it is carried, single readings that miss it are no loss; their mean decides.
+    for pressure in (2 * faint, 0.0) * 6:
+        assert monitor.carrying(reading(light, pressure=pressure)) is Event.NOTHING
+
+
 def test_a_pad_that_leaks_holds_what_surely_pulls() -> None:
     error_n = 0.15
     monitor = WrenchMonitor(CONFIG, error_n, vacuum_error=0.02)
