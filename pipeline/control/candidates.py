@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Int
 from pipeline.control.cloud import Cloud
 from pipeline.labelling.sampling import contact_frames
 
-_FEWEST_POINTS = 6  # a plane through fewer is no surface
+FEWEST_POINTS = 6  # a plane through fewer is no surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +64,7 @@ def sample_candidates(
     tilt_max_rad: float,
     rng: np.random.Generator,
     lean_max_rad: float = 0.0,
+    fewest: int = FEWEST_POINTS,
 ) -> Candidates:
     """Draw contacts at random from the cloud and give each its frame.
 
@@ -81,6 +82,8 @@ def sample_candidates(
         Generator of the draw.
     lean_max_rad
         How much steeper a surface may be that is approached at ``tilt_max_rad`` all the same [rad].
+    fewest
+        Points that a neighbourhood must have.
 
     Returns
     -------
@@ -90,7 +93,7 @@ def sample_candidates(
         return _NONE
     at = rng.integers(len(cloud), size=count)
     contacts, eyes = cloud.points_m[at], cloud.eye_m[at]
-    return candidates_at(cloud, contacts, eyes, radius_m, tilt_max_rad, lean_max_rad)
+    return candidates_at(cloud, contacts, eyes, radius_m, tilt_max_rad, lean_max_rad, fewest)
 
 
 def sample_near(
@@ -145,6 +148,7 @@ def candidates_at(
     radius_m: float,
     tilt_max_rad: float,
     lean_max_rad: float = 0.0,
+    fewest: int = FEWEST_POINTS,
 ) -> Candidates:
     """Compute the frame and roughness of each contact, and leave out steep ones.
 
@@ -167,6 +171,8 @@ def candidates_at(
         Largest angle between normal and vertical [rad].
     lean_max_rad
         As in `sample_candidates` [rad].
+    fewest
+        Points that a neighbourhood must have.
 
     Returns
     -------
@@ -174,7 +180,7 @@ def candidates_at(
     around them.
     """
     count, mean, scatter = _neighbourhoods(cloud.points_m, contacts_m, radius_m)
-    enough = count >= _FEWEST_POINTS
+    enough = count >= fewest
     if not enough.any():
         return _NONE
     contacts, eyes, mean = contacts_m[enough], eyes_m[enough], mean[enough]

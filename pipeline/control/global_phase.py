@@ -11,7 +11,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pipeline.config.evaluation import EvaluateConfig
-from pipeline.control.candidates import Candidates, sample_candidates, sample_near
+from pipeline.control.candidates import (
+    FEWEST_POINTS,
+    Candidates,
+    sample_candidates,
+    sample_near,
+)
 from pipeline.control.clearance import free_of_collision
 from pipeline.control.cloud import Cloud, DepthPicture, merged_cloud
 from pipeline.control.decision import Cause, Decision, Strategy, TriedContact
@@ -228,9 +233,13 @@ class GlobalPhase:
         if more == 0 or quality.max(initial=0.0) >= self._policy.enough_quality:
             return found, quality
         # All are rated again: each is averaged with its neighbours, and now it has some.
-        lean, wide_m = self._policy.lean_rad, self._policy.wide_normal_m
-        for count, radius_m in ((more - more // 2, self._normal_radius_m), (more // 2, wide_m)):
-            some = sample_candidates(cloud, count, radius_m, steepest, self._rng, lean)
+        lean, usual_m = self._policy.lean_rad, self._normal_radius_m
+        for count, radius_m in (
+            (more - more // 2, usual_m),
+            (more // 2, self._policy.wide_normal_m),
+        ):
+            fewest = round(FEWEST_POINTS * (radius_m / usual_m) ** 2)  # as dense a surface
+            some = sample_candidates(cloud, count, radius_m, steepest, self._rng, lean, fewest)
             found = found.joined(self._without_failed(some))
         quality = self._ranking(pictures, found) if len(found) else np.empty(0)
         self._robot.think()
