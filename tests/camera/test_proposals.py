@@ -129,7 +129,8 @@ def test_the_best_places_are_looked_at_more_closely() -> None:
     drawn_anew = both[len(first) :]
     assert (both[: len(first)] == first).all()
     assert 20 <= len(drawn_anew) <= 30
-    worth = nearest_to_the_corner(None, Candidates(pose_at(first), np.zeros(len(first))))
+    none = np.zeros(len(first))
+    worth = nearest_to_the_corner(None, Candidates(pose_at(first), none, none))
     best = first[apart(first, worth, config.predict.apart_m)[:3]]
     away = np.linalg.norm(drawn_anew[:, None] - best[None], axis=2).min(axis=1)
     # A contact is moved from its drawn point onto the plane around it.

@@ -2,7 +2,7 @@
 
 import pytest
 
-from pipeline.clutter.levels import LEVELS, Distribution, level_of
+from pipeline.clutter.levels import LEVELS, Distribution, clutter_ids, clutter_number, level_of
 from pipeline.geometry.shape import ShapeClass
 
 
@@ -17,3 +17,7 @@ def test_nine_levels_are_all_pairs() -> None:
 def test_there_is_no_tenth_level(level: int) -> None:
     with pytest.raises(ValueError, match="from 1 to 9"):
         level_of(level)
+
+
+def test_a_clutters_name_tells_its_number() -> None:
+    assert [clutter_number(name) for name in clutter_ids(7, "test", 12)] == list(range(12))

@@ -9,6 +9,7 @@ import pytest
 from pipeline.artifacts import from_tensor, open_artifact
 from pipeline.config import load_run_config
 from pipeline.config.evaluation import PolicyName
+from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder
 from pipeline.execution.staleness import stage_context
 from pipeline.labelling.poses import label_poses
@@ -31,6 +32,14 @@ def test_clutters_are_of_the_split_that_is_asked_for(run: RunFolder, split: str)
     config = context.config.model_copy(update={"evaluate": wanted})
     found = clutters(replace(context, config=config))
     assert [scene.split for scene in found] == [split]
+
+
+def test_the_first_clutters_of_a_level_may_be_left_out(run: RunFolder) -> None:
+    context = stage_context(EVALUATE, run, inputs_of, None, workers=1)
+    wanted = context.config.evaluate.model_copy(update={"clutters_from": 1})
+    config = context.config.model_copy(update={"evaluate": wanted})
+    with pytest.raises(ArtifactError, match=r"no test clutter from number 1 on.*at least 2"):
+        clutters(replace(context, config=config))
 
 
 def test_the_analytic_policy_asks_the_baseline_that_was_fitted_to_the_train_split(
