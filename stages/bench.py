@@ -16,6 +16,7 @@ from pipeline.artifacts import publish_bytes
 from pipeline.benchmarks import clutter, control, inference, labelling, loading, solvers, storage
 from pipeline.benchmarks.commits import against_older
 from pipeline.benchmarks.cutting import cutting_time
+from pipeline.benchmarks.driver import driver_share
 from pipeline.benchmarks.shuffling import shuffle_costs
 from pipeline.config import RunConfig, load_run_config
 from pipeline.execution import RunFolder, generator, run_command, run_in_order
@@ -63,7 +64,6 @@ class Bench:
 def measure_all() -> None:
     """Measure, print the table, write bench.json."""
     bench = open_bench(RunFolder(RUNS_DIR / "bench"))
-    config, scene = bench.config, bench.scenes[-1]
     samples = stored_samples(bench)
     figures: dict[str, object] = {"cores": len(os.sched_getaffinity(0))}
     measures: tuple[Measure, ...] = (
@@ -74,10 +74,11 @@ def measure_all() -> None:
         lambda: storage.figures(samples),
         lambda: loading.figures(samples),
         shuffle_costs,
-        lambda: inference.figures(config.network, samples),
-        lambda: control.figures(scene, bench.meshes, config),
-        lambda: clutter.figures(bench.objects.values(), config.scenes),
-        lambda: cutting_time(bench.objects.values(), config.objects.convex),
+        lambda: driver_share(bench.folder),
+        lambda: inference.figures(bench.config.network, samples),
+        lambda: control.figures(bench.scenes[-1], bench.meshes, bench.config),
+        lambda: clutter.figures(bench.objects.values(), bench.config.scenes),
+        lambda: cutting_time(bench.objects.values(), bench.config.objects.convex),
     )
     for measure in measures:
         figures |= (found := measure())
@@ -189,8 +190,7 @@ def worker_rate(job: WorkerJob) -> float:
 
 def stored_samples(bench: Bench) -> Samples:
     """Labelled samples of the run's scenes."""
-    rng = np.random.default_rng(0)
-    wanted = STORED_SAMPLES // len(bench.scenes)
+    rng, wanted = np.random.default_rng(0), STORED_SAMPLES // len(bench.scenes)
     return storage.samples_of_grasps(
         [part for scene in bench.scenes for _, part in labelled_scene(bench, scene, wanted, rng)]
     )

@@ -11,10 +11,11 @@ from jaxtyping import Float
 from loguru import logger
 
 from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact
-from pipeline.artifacts.sharding import is_current
+from pipeline.artifacts.sharding import is_current, shard_entry
 from pipeline.config import RunConfig
 from pipeline.errors import SceneError
 from pipeline.execution import generator
+from pipeline.execution.items import item_key
 from pipeline.labelling.scene import label_scene, scene_surfaces
 from pipeline.labelling.shown_pads import drape_some_again
 from pipeline.messages.grasps import (
@@ -28,10 +29,11 @@ from pipeline.messages.grasps import (
     write_messages,
 )
 from pipeline.messages.objects import catalogue
-from pipeline.messages.scenes import read_scene
+from pipeline.messages.scenes import read_key, read_scene
 from pipeline.stopwatch import Stopwatch
 from pipeline.world.raycasting import RayScene
 from pipeline.world.scene import ClutterScene
+from schemas.softgrip.v1.grasps_pb2 import ShardEntry
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,6 @@ class Portion:
 
     number: int
     grasps: int
-    key: str
     former: Path | None  # the shard that held it before
 
 
@@ -50,6 +51,7 @@ class ShardJob:
 
     scene_index: int
     portions: tuple[Portion, ...]
+    basis: str  # of the keys of portions
     pads: int  # of its grasps, shown in the recording
     shard: Path
     objects: Path
@@ -62,8 +64,7 @@ class ShardJob:
 class ShardResult:
     """What the driver needs to know of a finished shard."""
 
-    shard: Path
-    split: str
+    entry: ShardEntry  # the digest is taken where the file was written
     quality: Float[np.ndarray, " n"]
     object_names: tuple[str, ...]
     status: dict[str, int]
@@ -72,12 +73,17 @@ class ShardResult:
     spent_s: float = 0.0  # processor time of all of it, where it was made
 
 
+def portion_key(basis: str, scene_key: str, number: int, grasps: int) -> str:
+    """What a portion of the grasps of a scene depends on, as a digest."""
+    return item_key(basis, scene=scene_key, grasps=grasps, portion=number)
+
+
 def synthesize_shard(job: ShardJob) -> ShardResult:
     """Make, or keep, the shard of one scene."""
     if is_current(job.shard, job.provenance.key):
         return examined(job)
     draping, world, began = Stopwatch(), LabelledWorld(job), time.process_time()
-    former = {p: read_portion(p.former, p.key) for p in job.portions if p.former}
+    former = {p: read_portion(p.former, world.key(p)) for p in job.portions if p.former}
     portions = [former.get(portion) or world.labelled(portion) for portion in job.portions]
     messages = [message for portion in portions for message in portion]
     with ArtifactWriter(job.shard, job.provenance) as artifact:
@@ -100,6 +106,11 @@ class LabelledWorld:
     job: ShardJob
 
     @cached_property
+    def scene_key(self) -> str:
+        """Key of the scene; no image is read."""
+        return read_key(self.job.scenes, self.job.scene_index)
+
+    @cached_property
     def scene(self) -> ClutterScene:
         """What its cameras saw, and where its objects lie."""
         return read_scene(self.job.scenes, self.job.scene_index)
@@ -109,6 +120,10 @@ class LabelledWorld:
         """Its true surfaces."""
         meshes = {name: item.mesh for name, (item, _) in catalogue(self.job.objects).items()}
         return scene_surfaces(self.scene, meshes, self.job.config.scenes.table_side_m)
+
+    def key(self, portion: Portion) -> str:
+        """Key of a portion of its grasps."""
+        return portion_key(self.job.basis, self.scene_key, portion.number, portion.grasps)
 
     def labelled(self, portion: Portion) -> list[GraspMessage]:
         """Label a portion of its grasps; the first is drawn from the stream of the scene."""
@@ -122,7 +137,7 @@ class LabelledWorld:
             logger.warning("left out: {}", error)
             return []
         size, rounded = config.grasps.samples_per_message, config.sensing.rounded
-        return grasp_messages(batches, size, rounded, portion.key)
+        return grasp_messages(batches, size, rounded, self.key(portion))
 
 
 def examined(job: ShardJob) -> ShardResult:
@@ -138,4 +153,5 @@ def examined(job: ShardJob) -> ShardResult:
     # A shard of a scene that was left out holds no grasp to tell the split.
     split = split or LabelledWorld(job).scene.split
     all_q = np.concatenate(quality) if quality else np.empty(0)
-    return ShardResult(job.shard, split, all_q, tuple(sorted(names)), dict(status))
+    entry = shard_entry(job.shard, job.shard.parent.parent, len(all_q), split)
+    return ShardResult(entry, all_q, tuple(sorted(names)), dict(status))

@@ -7,58 +7,58 @@ torques about x, y (the wrench of pipeline/gripper/wrench has four rows).
 
 import time
 from collections import Counter
+from pathlib import Path
 
 import numpy as np
 
-from pipeline.artifacts.sharding import shard_entry, shard_path, write_index
+from pipeline.artifacts.sharding import shard_path, write_index
 from pipeline.config import RunConfig
 from pipeline.execution import StageContext, Summary, progress, run_in_order, stage_command
 from pipeline.execution.driver_cost import driver_cost
-from pipeline.execution.items import grasps_basis, item_key
+from pipeline.execution.items import grasps_basis
 from pipeline.labelling.balancing import quality_histogram
 from pipeline.labelling.scene import noise_draws
 from pipeline.labelling.shown_pads import SHOWN_SCENES
 from pipeline.messages.grasps import portions_by_key
-from pipeline.messages.scenes import read_keys
+from pipeline.messages.scenes import read_keys, scene_count
 from pipeline.recording.grasps import draw_grasps
 from pipeline.spread import choose_evenly
 from stages.graph import GRASPS, inputs_of
-from stages.grasp_shards import Portion, ShardJob, ShardResult, synthesize_shard
+from stages.grasp_shards import Portion, ShardJob, ShardResult, portion_key, synthesize_shard
 
 
 def build(stage: StageContext) -> Summary:
     """Synthesize labelled grasps on every scene, one shard a scene."""
-    scenes, config, former = stage.upstream("scenes"), stage.config, portions_by_key(stage.shards)
-    count = len(keys := read_keys(scenes))
+    began, scenes, config = time.process_time(), stage.upstream("scenes"), stage.config
+    basis, count = grasps_basis(stage.key, config), scene_count(scenes)
+    former = former_portions(stage, basis)
     recorded = choose_evenly(count, SHOWN_SCENES)
-    basis = grasps_basis(stage.key, config)
-    pads = max(1, config.recording.grasps // len(recorded))
+    pads, provenance = max(1, config.recording.grasps // len(recorded)), stage.provenance()
     jobs = [
         ShardJob(
             scene_index=index,
             portions=tuple(
-                Portion(number, grasps, key, former.get(key))
+                Portion(number, grasps, former.get((index, number)))
                 for number, grasps in enumerate(portions)
-                for key in [item_key(basis, scene=keys[index], grasps=grasps, portion=number)]
             ),
+            basis=basis,
             pads=pads if index in recorded else 0,
             shard=shard_path(stage.shards, index, count),
             objects=stage.upstream("objects"),
             scenes=scenes,
             config=config,
-            provenance=stage.provenance(),
+            provenance=provenance,
         )
         for index, portions in enumerate(config.grasps.of_scenes(count))
     ]
-    began = time.process_time()
     done = run_in_order(
         synthesize_shard, jobs, stage.workers, stage.executor, limit_s=stage.item_limit_s
     )
     results = list(progress(done, count, "grasps", "scene"))
     quality = np.concatenate([result.quality for result in results])
     stage.drawing.seconds += sum(result.recording_s for result in results)
-    entries = [shard_entry(r.shard, stage.output.parent, len(r.quality), r.split) for r in results]
-    write_index(stage.output, stage.provenance(), entries, quality_histogram(quality))
+    entries = [result.entry for result in results]
+    write_index(stage.output, provenance, entries, quality_histogram(quality))
     taken_over = sum(result.taken_over for result in results)
     made = sum(len(job.portions) for job in jobs) - taken_over
     grown = {"taken_over": taken_over, "made": made, "items_basis": basis}
@@ -68,13 +68,29 @@ def build(stage: StageContext) -> Summary:
     return summary(results, quality, config) | grown | cost
 
 
+def former_portions(stage: StageContext, basis: str) -> dict[tuple[int, int], Path]:
+    """Scene and number of a portion → the shard that held it, of those of a former run.
+
+    Only then the scenes' keys are read here: each worker reads that of its own scene.
+    """
+    if not (former := portions_by_key(stage.shards, besides=stage.key.digest)):
+        return {}
+    keys = read_keys(stage.upstream("scenes"))
+    return {
+        (index, number): former[key]
+        for index, portions in enumerate(stage.config.grasps.of_scenes(len(keys)))
+        for number, grasps in enumerate(portions)
+        if (key := portion_key(basis, keys[index], number, grasps)) in former
+    }
+
+
 def summary(results: list[ShardResult], quality: np.ndarray, config: RunConfig) -> Summary:
     """The stage's headline figures."""
     status: Counter[str] = Counter()
     for result in results:
         status.update(result.status)
     return {
-        "grasps": sum(len(r.quality) // noise_draws(r.split, config) for r in results),
+        "grasps": sum(len(r.quality) // noise_draws(r.entry.split, config) for r in results),
         "clouds": len(quality),
         "quality_histogram": quality_histogram(quality).tolist(),
         "status": dict(sorted(status.items())),

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.artifacts.reading import Artifact, open_artifact
+from pipeline.artifacts.sharding import is_current
 from pipeline.artifacts.tensors import set_tensors, tensors_of
 from pipeline.artifacts.writing import ArtifactWriter
 from pipeline.errors import ArtifactError, ContentError
@@ -136,10 +137,24 @@ def write_messages(artifact: ArtifactWriter, messages: Sequence[GraspMessage]) -
     return sum(counts)
 
 
-def portions_by_key(folder: Path) -> dict[str, Path]:
-    """Key of each portion of grasps → the shard in a folder that holds it; no cloud is read."""
+def portions_by_key(folder: Path, besides: str = "") -> dict[str, Path]:
+    """Which shard holds which portion of grasps; no cloud is read.
+
+    Parameters
+    ----------
+    folder
+        Of the shards.
+    besides
+        Key of shards that are left out: those that stay as they are.
+
+    Returns
+    -------
+    Key of each portion → the shard that holds it.
+    """
     found: dict[str, Path] = {}
     for shard in sorted(folder.glob("*.mcap")):
+        if besides and is_current(shard, besides):
+            continue
         with suppress(ArtifactError), open_artifact(shard) as artifact:  # such are made anew
             found |= {rows.key: shard for _, rows in artifact.messages(GraspBatch) if rows.key}
     return found

@@ -126,6 +126,12 @@ def read_placed(path: Path, index: int) -> tuple[PlacedObject, ...]:
         return _placed(message)
 
 
+def read_key(path: Path, index: int) -> str:
+    """The key of scene ``index``; no image is read."""
+    with open_artifact(path) as artifact:
+        return str(_message(artifact, index)[0].key)
+
+
 def read_keys(path: Path) -> list[str]:
     """The key of every scene, in order; no image is read."""
     with open_artifact(path) as artifact:

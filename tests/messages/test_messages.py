@@ -175,6 +175,8 @@ def test_a_portion_is_read_from_the_shard_that_holds_it_and_from_no_damaged_one(
         assert write_messages(artifact, [*first, *second]) == 16
     (tmp_path / "1.mcap").write_bytes(shard.read_bytes()[:-50])
     assert portions_by_key(tmp_path) == {"one": shard, "two": shard}
+    assert portions_by_key(tmp_path, besides="another") == {"one": shard, "two": shard}
+    assert portions_by_key(tmp_path, besides=provenance.key) == {}
     assert read_portion(shard, "two") == second
     assert read_portion(shard, "three") == []
     assert read_portion(tmp_path / "1.mcap", "one") == []
