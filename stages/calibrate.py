@@ -5,7 +5,8 @@ The threshold is chosen on the val split and checked on the test split.
 """
 
 import json
-from dataclasses import asdict
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -18,16 +19,34 @@ from pipeline.artifacts import publish_bytes
 from pipeline.config import load_run_config
 from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder, run_command
-from pipeline.messages.sample_cache import cached_split
+from pipeline.messages.sample_cache import read_parts
 from pipeline.messages.training import EXPORT
 from pipeline.network.calibration import fit_calibration, kept_by
 from pipeline.network.samples import Samples
-from pipeline.network.sources import quality_source
+from pipeline.network.sources import QualitySource, quality_source
 from stages.graph import RUNS_DIR
-from stages.train import SAMPLES
 
 THREADS = 2  # cores of the smallest machine that is supported
 SHOWN = tuple(tenth / 10 for tenth in range(1, 10))  # q-hat whose probability is written
+
+
+@dataclass(frozen=True)
+class Answers:
+    """What a network answers for samples, and what they are.
+
+    Attributes
+    ----------
+    predicted
+        q-hat, shape (n,).
+    quality
+        q, shape (n,).
+    proposed
+        How many grasps of Algorithm 1 each stands for, shape (n,).
+    """
+
+    predicted: Float[np.ndarray, " n"]
+    quality: Float[np.ndarray, " n"]
+    proposed: Float[np.ndarray, " n"]
 
 
 def calibrate(
@@ -45,25 +64,21 @@ def calibrate(
             f"{folder.artifact('shards')} is missing", f"Make it first: make dataset RUN={run}"
         )
     source = quality_source(network or str(folder.path / "train" / EXPORT), config.gripper, THREADS)
-    splits = {
-        name: cached_split(folder.artifact("shards"), name, folder.state(SAMPLES))
+    answers = {
+        name: answered(source, read_parts(folder.artifact("shards"), name))
         for name in ("val", "test")
-    }
-    predicted = {
-        name: np.asarray(source.predict(samples.cloud, samples.cloud_mask), dtype=np.float64)
-        for name, samples in splits.items()
     }
     settings = config.predict
     fitted = fit_calibration(
-        predicted["val"],
-        np.asarray(splits["val"].quality),
-        proposed(splits["val"]),
+        answers["val"].predicted,
+        answers["val"].quality,
+        answers["val"].proposed,
         settings.good_quality,
     )
     threshold = fitted.threshold(settings.good_probability)
     figures = {
         "network": source.name,
-        "samples": {name: int((proposed(one) > 0).sum()) for name, one in splits.items()},
+        "samples": {name: int((one.proposed > 0).sum()) for name, one in answers.items()},
         "good_quality": settings.good_quality,
         "good_probability": settings.good_probability,
         "quality_min": threshold,
@@ -74,9 +89,9 @@ def calibrate(
         else asdict(
             kept_by(
                 threshold,
-                predicted["test"],
-                np.asarray(splits["test"].quality),
-                proposed(splits["test"]),
+                answers["test"].predicted,
+                answers["test"].quality,
+                answers["test"].proposed,
                 settings.good_quality,
             )
         ),
@@ -99,6 +114,18 @@ def calibrate(
             threshold,
         )
     logger.info("calibrate: {}", path)
+
+
+def answered(source: QualitySource, parts: Iterable[Samples]) -> Answers:
+    """Ask about samples, a part of them in memory at a time."""
+    found = [
+        (source.predict(part.cloud, part.cloud_mask), np.asarray(part.quality), proposed(part))
+        for part in parts
+    ]
+    if not found:
+        raise ArtifactError("a split holds no samples", "Ask for more grasps or objects.")
+    predicted, quality, weight = (np.concatenate(column) for column in zip(*found, strict=True))
+    return Answers(predicted.astype(np.float64), quality, weight)
 
 
 def proposed(samples: Samples) -> Float[np.ndarray, " n"]:

@@ -29,7 +29,7 @@ from pipeline.artifacts import ArtifactWriter, Provenance
 from pipeline.artifacts.sharding import is_current
 from pipeline.config import RunConfig
 from pipeline.execution import StageContext, Summary, progress, run_in_order, stage_command
-from pipeline.messages.sample_cache import cached_split
+from pipeline.messages.sample_cache import first_samples
 from pipeline.messages.sweep import (
     budget_message,
     mark_networks,
@@ -43,7 +43,6 @@ from pipeline.network.family import (
     list_members,
     measure_member,
     member_training,
-    take_budget,
     time_network_ms,
 )
 from pipeline.network.samples import SPLITS, Samples
@@ -51,7 +50,6 @@ from pipeline.network.training import train
 from pipeline.recording.sweep import draw_sweep
 from schemas.softgrip.v1.training_pb2 import SweepBudget, SweepNetwork
 from stages.graph import SWEEP, inputs_of
-from stages.train import SAMPLES
 
 TIMED_BATCH = 64  # grasps asked at once, as in a control step
 TIMED_THREADS = 2  # cores of the smallest machine that is supported
@@ -65,7 +63,6 @@ class MemberJob:
     member: Member
     path: Path
     shards: Path
-    cache: Path
     config: RunConfig
     provenance: Provenance
 
@@ -73,7 +70,7 @@ class MemberJob:
 def build(stage: StageContext) -> Summary:
     """Train family, repeats and ablation on one budget, time them, mark the chosen one."""
     config = stage.config
-    given = given_samples(config, stage.upstream("shards"), stage.folder.state(SAMPLES))
+    given = given_samples(config, stage.upstream("shards"))
     jobs = member_jobs(stage)
     done = run_in_order(train_member, jobs, stage.workers, stage.executor, ahead_per_worker=64)
     parts = list(progress(done, len(jobs), "sweep: networks", "network"))
@@ -97,7 +94,6 @@ def member_jobs(stage: StageContext) -> list[MemberJob]:
             member=member,
             path=stage.folder.state("sweep") / f"{member.name}.mcap",
             shards=stage.upstream("shards"),
-            cache=stage.folder.state(SAMPLES),
             config=config,
             provenance=stage.provenance(),
         )
@@ -105,19 +101,18 @@ def member_jobs(stage: StageContext) -> list[MemberJob]:
     ]
 
 
-def given_samples(config: RunConfig, shards: Path, cache: Path) -> dict[str, Samples]:
-    """Split to what every member gets of it."""
-    return {
-        split: take_budget(config.sweep, split, cached_split(shards, split, cache))
-        for split in SPLITS
-    }
+def given_samples(config: RunConfig, shards: Path) -> dict[str, Samples]:
+    """Split to what every member gets of it: its first samples, for splits are shuffled."""
+    held_out = config.sweep.held_out_samples
+    wanted = {split: config.sweep.samples if split == "train" else held_out for split in SPLITS}
+    return {split: first_samples(shards, split, count) for split, count in wanted.items()}
 
 
 def train_member(job: MemberJob) -> Path:
     """Train, or keep, one member."""
     if is_current(job.path, job.provenance.key):
         return job.path
-    given = given_samples(job.config, job.shards, job.cache)
+    given = given_samples(job.config, job.shards)
     config = member_training(job.config.train, job.config.sweep, job.member)
     state = job.path.with_suffix("")
     trained = train(

@@ -20,7 +20,7 @@ from pipeline.artifacts.reading import open_artifact
 from pipeline.artifacts.sharding import listed_shards, read_index
 from pipeline.errors import ArtifactError
 from pipeline.messages.samples import STORED_AS, read_samples
-from pipeline.network.samples import Samples
+from pipeline.network.samples import Samples, join_samples
 from schemas.softgrip.v1.grasps_pb2 import ShardEntry
 
 # Rises whenever the files of a cache change: one of another version is made again.
@@ -69,6 +69,63 @@ def cached_split(index: Path, split: str, cache: Path) -> Samples:
             finally:  # whatever happens, an interrupt of the first call included
                 shutil.rmtree(scratch, ignore_errors=True)
     return mapped_samples(folder)
+
+
+def read_parts(index: Path, split: str) -> Iterator[Samples]:
+    """The samples of a split in shard order, a message in memory at a time.
+
+    Parameters
+    ----------
+    index
+        The index of a sharded artifact.
+    split
+        Such as ``val``.
+
+    Yields
+    ------
+    Samples
+        Those of the next message.
+
+    Raises
+    ------
+    ArtifactError
+        A shard is missing, damaged, or not the one that the index names.
+    """
+    entries = [entry for entry in read_index(index).shards if entry.split == split]
+    yield from _parts(dict(zip(listed_shards(index, [split]), entries, strict=True)))
+
+
+def first_samples(index: Path, split: str, wanted: int) -> Samples:
+    """The first samples of a split, or all where there are no more, in memory.
+
+    Parameters
+    ----------
+    index
+        The index of a sharded artifact.
+    split
+        Such as ``train``.
+    wanted
+        How many; at least one.
+
+    Returns
+    -------
+    The samples, of no more shards than hold them.
+
+    Raises
+    ------
+    ArtifactError
+        A shard is missing, damaged, or not the one that the index names; or the split is empty.
+    """
+    parts: list[Samples] = []
+    found = 0
+    for part in read_parts(index, split):
+        parts.append(part.take(slice(0, wanted - found)))
+        found += len(parts[-1])
+        if found == wanted:
+            break
+    if not found:
+        raise ArtifactError("a split holds no samples", "Ask for more grasps or objects.")
+    return join_samples(parts)
 
 
 def cache_key(entries: Iterable[ShardEntry]) -> str:

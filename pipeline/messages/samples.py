@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Integer
 
 from pipeline.artifacts.reading import Artifact, open_artifact
 from pipeline.artifacts.sharding import listed_shards
@@ -153,6 +154,56 @@ def read_split(index: Path, split: str) -> Samples:
     The samples, in memory.
     """
     return join_samples(list(_batches(listed_shards(index, [split]))))
+
+
+def read_rows(index: Path, split: str) -> Samples:
+    """All samples of a split without their clouds, in shard order.
+
+    Parameters
+    ----------
+    index
+        The index of a sharded artifact.
+    split
+        Such as ``test``.
+
+    Returns
+    -------
+    The samples, in memory; their clouds have no cells.
+    """
+    parts = []
+    for shard in listed_shards(index, [split]):
+        with open_artifact(shard) as artifact:
+            for _, message in artifact.messages(SampleBatch):
+                part = samples_of(message)  # an older file has clouds in it
+                cloud, mask = part.cloud[:, :0, :0].copy(), part.cloud_mask[:, :0, :0].copy()
+                parts.append(replace(part, cloud=cloud, cloud_mask=mask))
+    return join_samples(parts)
+
+
+def read_chosen(index: Path, split: str, numbers: Integer[np.ndarray, " k"]) -> Samples:
+    """Some samples of a split; of the others no more than a message is in memory at a time.
+
+    Parameters
+    ----------
+    index
+        The index of a sharded artifact.
+    split
+        Such as ``test``.
+    numbers
+        Which, counted in shard order, shape (k,); at least one.
+
+    Returns
+    -------
+    The samples, in the order of the numbers.
+    """
+    order = np.argsort(numbers, kind="stable")
+    wanted, parts, start = numbers[order], [], 0
+    for part in _batches(listed_shards(index, [split])):
+        within = wanted[(wanted >= start) & (wanted < start + len(part))] - start
+        if len(within):
+            parts.append(part.take(within))
+        start += len(part)
+    return join_samples(parts).take(np.argsort(order, kind="stable"))
 
 
 def _batches(shards: Iterable[Path]) -> Iterator[Samples]:

@@ -10,6 +10,7 @@ from pipeline.network.figures import mean_absolute_error, weighted_error
 
 # Below so many cells a plane is not fitted: the ratio is 0.
 _FEWEST_CELLS = 3
+PART = 1024  # clouds whose points are held in double precision at once: a split may be mapped
 
 
 def mean_predictor_mae(
@@ -77,15 +78,32 @@ def seal_ratio(
     -------
     Ratio in [0, 1], shape (n,); 0 where too few cells are seen to fit a plane.
     """
-    n = len(mask)
-    points = np.where(mask[..., None], cloud, 0).astype(np.float64)
-    seen_radius = np.hypot(points[..., 0], points[..., 1])
-    inside = mask & (seen_radius <= seal_radius)
     # Unseen cells count against the seal: take the cells of Reg.V from the grid, whose spacing
     # is that of the seen points.
     cells = _cells_within(cloud, mask, seal_radius)
-    ratios = np.zeros(n)
-    for index in range(n):
+    parts = _parts(len(mask))
+    ratios = [_seal_ratio_of(cloud[p], mask[p], seal_radius, tolerance, cells) for p in parts]
+    return np.concatenate([np.zeros(0), *ratios])
+
+
+def _parts(n: int) -> list[slice]:
+    """Neighbouring samples, ``PART`` at a time."""
+    return [slice(start, start + PART) for start in range(0, n, PART)]
+
+
+def _seal_ratio_of(
+    cloud: Float[np.ndarray, "n h w 3"],
+    mask: Bool[np.ndarray, "n h w"],
+    seal_radius: float,
+    tolerance: float,
+    cells: int,
+) -> Float[np.ndarray, " n"]:
+    """`seal_ratio` of some clouds, of a grid with so many cells within Reg.V."""
+    points = np.where(mask[..., None], cloud, 0).astype(np.float64)
+    seen_radius = np.hypot(points[..., 0], points[..., 1])
+    inside = mask & (seen_radius <= seal_radius)
+    ratios = np.zeros(len(mask))
+    for index in range(len(mask)):
         patch = points[index][inside[index]]
         if len(patch) < _FEWEST_CELLS or cells == 0:
             continue
@@ -148,9 +166,12 @@ def _spacing(
     size = mask.shape[axis]
     steps = np.arange(size) - (size - 1) / 2
     shape = (1, size, 1) if axis == 1 else (1, 1, size)
-    step = np.broadcast_to(steps.reshape(shape), mask.shape)[mask]
-    seen = coordinate[mask].astype(np.float64)
-    return float(step @ seen / max(float(step @ step), 1.0))
+    along = squares = 0.0
+    for part in _parts(len(mask)):
+        step = np.broadcast_to(steps.reshape(shape), mask[part].shape)[mask[part]]
+        along += float(step @ coordinate[part][mask[part]].astype(np.float64))
+        squares += float(step @ step)
+    return along / max(squares, 1.0)
 
 
 def _plane_residual(

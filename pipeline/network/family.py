@@ -162,15 +162,6 @@ def list_members(sweep: SweepConfig, of_run: NetworkConfig, seed: int) -> list[M
     return members
 
 
-def take_budget(sweep: SweepConfig, split: str, samples: Samples) -> Samples:
-    """The samples of a split ("train", "val" or "test") that every member gets: the first ones.
-
-    A split is shuffled, so that its first samples represent it.
-    """
-    wanted = sweep.samples if split == "train" else sweep.held_out_samples
-    return samples.take(slice(0, wanted))
-
-
 def member_training(config: TrainConfig, sweep: SweepConfig, member: Member) -> TrainConfig:
     """The run's training cut to the budget, on one thread: members train side by side."""
     cut = {"epochs": sweep.epochs, "patience_epochs": sweep.epochs, "batch_size": sweep.batch_size}

@@ -9,7 +9,7 @@ import rerun.blueprint as rrb
 from jaxtyping import Float, Integer
 
 from pipeline.artifacts import open_artifact
-from pipeline.messages.samples import read_split
+from pipeline.messages.samples import read_chosen, read_rows
 from pipeline.messages.training import figures_of, fine_tuning_of, metrics_of
 from pipeline.network.fine_tuning import FineTuning
 from pipeline.network.fitted_baselines import MEAN, TITLES
@@ -36,13 +36,17 @@ SCATTER_POINTS = 5000  # more hide each other in the plot
 
 def draw_train(stage: FinishedStage, figures: Mapping[str, Any]) -> None:
     """Draw the recording: the curve and the figures of the artifact, on the test clouds."""
-    test_set = read_split(stage.upstream("shards"), "test")
+    shards = stage.upstream("shards")
     with open_artifact(stage.output) as artifact:
         history = [metrics_of(message) for _, message in artifact.messages(Epoch)]
         result = artifact.one(TrainingResult)
-    held_out, tuned = figures_of(result, test_set), fine_tuning_of(result)
+    held_out, tuned = figures_of(result, read_rows(shards, "test")), fine_tuning_of(result)
+    worst = worst_first(held_out)[: min(stage.config.recording.clouds, SHEET_SAMPLES)]
     with recording(stage, blueprint()) as stream:
-        show_training(stream, history, held_out, test_set, stage.config.recording.clouds)
+        show_training(stream, history, held_out)
+        shown = read_chosen(shards, "test", worst)
+        numbers = np.arange(len(worst))
+        show_sheet(stream, "world/worst", shown, held_out.predicted[worst], numbers)
         if tuned:
             told = rr.TextDocument(tuning_table(tuned), media_type=rr.MediaType.MARKDOWN)
             stream.log("notes/fine_tuning", told, static=True)
@@ -82,14 +86,15 @@ def blueprint() -> rrb.Blueprint:
     )
 
 
+def worst_first(figures: TestFigures) -> Integer[np.ndarray, " n"]:
+    """Numbers of the test samples, those of the largest errors first, shape (n,)."""
+    return np.argsort(-np.abs(figures.predicted - figures.quality), kind="stable")
+
+
 def show_training(
-    stream: rr.RecordingStream,
-    history: Sequence[EpochMetrics],
-    figures: TestFigures,
-    test_set: Samples,
-    wanted: int,
+    stream: rr.RecordingStream, history: Sequence[EpochMetrics], figures: TestFigures
 ) -> None:
-    """Log the curve, the calibration and the ``wanted`` worst samples."""
+    """Log the curve and the calibration."""
     for name, colour in (("train", 4), ("val", 0), ("mean_predictor", 7)):
         name_curve(stream, f"curves/error/{name}", name.replace("_", " "), colours.PALETTE[colour])
     name_curve(stream, "curves/rate", "learning rate", colours.PALETTE[6])
@@ -100,9 +105,6 @@ def show_training(
         stream.log("curves/error/mean_predictor", rr.Scalars(figures.baselines.balanced[MEAN]))
         stream.log("curves/rate", rr.Scalars(metrics.learning_rate))
     show_calibration(stream, figures.quality, figures.predicted, figures.calibration)
-    error = np.abs(figures.predicted - figures.quality)
-    worst = np.argsort(-error, kind="stable")[: min(wanted, SHEET_SAMPLES)]
-    show_sheet(stream, "world/worst", test_set, figures.predicted, worst)
     tenths = np.array([0.0 if error is None else error for error in figures.by_tenth])
     stream.log("curves/by_tenth", rr.BarChart(tenths, color=colours.PALETTE[0]), static=True)
     stream.log(

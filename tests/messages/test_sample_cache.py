@@ -10,8 +10,8 @@ from pipeline.artifacts import ArtifactWriter, Provenance
 from pipeline.artifacts.publishing import scratch_beside
 from pipeline.artifacts.sharding import shard_entry, shard_path, write_index
 from pipeline.errors import ArtifactError
-from pipeline.messages.sample_cache import cached_split
-from pipeline.messages.samples import write_samples
+from pipeline.messages.sample_cache import cached_split, first_samples, read_parts
+from pipeline.messages.samples import read_chosen, read_rows, read_split, write_samples
 from pipeline.network.samples import Samples, join_samples
 
 
@@ -124,3 +124,47 @@ def test_a_split_without_samples_is_refused(tmp_path: Path, provenance: Provenan
     index = sharded(tmp_path, provenance, PARTS)
     with pytest.raises(ArtifactError, match="no samples"):
         cached_split(index, "val", tmp_path / "cache")
+
+
+@pytest.mark.parametrize("wanted", [1, 6, 9, 50])
+def test_the_first_samples_are_those_of_the_cache(
+    tmp_path: Path, provenance: Provenance, wanted: int
+) -> None:
+    index = sharded(tmp_path, provenance, PARTS)
+    mapped = cached_split(index, "train", tmp_path / "cache")
+    first = first_samples(index, "train", wanted)
+    for field in fields(Samples):
+        found, same = getattr(first, field.name), getattr(mapped, field.name)[:wanted]
+        np.testing.assert_array_equal(found, same)
+        assert found.dtype == same.dtype
+
+
+def test_of_the_first_samples_no_later_shard_is_opened(
+    tmp_path: Path, provenance: Provenance
+) -> None:
+    index = sharded(tmp_path, provenance, PARTS)
+    (tmp_path / "shards" / "00001-of-00003.mcap").write_bytes(b"damaged")
+    assert len(first_samples(index, "train", 7)) == 7
+    with pytest.raises(ArtifactError, match="is not the shard that its index names"):
+        first_samples(index, "train", 8)
+    with pytest.raises(ArtifactError, match="is not the shard that its index names"):
+        list(read_parts(index, "train"))
+
+
+def test_a_split_of_no_samples_has_no_first_ones(tmp_path: Path, provenance: Provenance) -> None:
+    with pytest.raises(ArtifactError, match="a split holds no samples"):
+        first_samples(sharded(tmp_path, provenance, PARTS), "val", 1)
+
+
+def test_chosen_samples_come_in_the_order_asked_for_and_rows_without_clouds(
+    tmp_path: Path, provenance: Provenance
+) -> None:
+    index = sharded(tmp_path, provenance, PARTS)
+    whole, numbers = read_split(index, "train"), np.array([11, 0, 6, 7, 0])
+    chosen, rows = read_chosen(index, "train", numbers), read_rows(index, "train")
+    for field in fields(Samples):
+        same = getattr(whole, field.name)
+        np.testing.assert_array_equal(getattr(chosen, field.name), same[numbers])
+        if field.name not in {"cloud", "cloud_mask"}:
+            np.testing.assert_array_equal(getattr(rows, field.name), same)
+    assert rows.cloud.size == rows.cloud_mask.size == 0

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from pipeline.network import baselines
 from pipeline.network.baselines import (
     fit_monotone,
     mean_predictor_mae,
@@ -38,6 +39,16 @@ def test_full_tilted_plane_seals_and_half_a_plane_half() -> None:
 def test_nothing_seen_is_no_seal() -> None:
     cloud = np.zeros((1, 24, 24, 3))
     assert seal_ratio(cloud, np.zeros((1, 24, 24), dtype=np.bool_), 0.8, TOLERANCE) == [0.0]
+
+
+def test_seal_ratios_do_not_depend_on_how_many_clouds_are_held_at_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    planes = planes_with_holes(20, seed=3)
+    whole = seal_ratio(planes.cloud, planes.mask, SEAL_RADIUS, TOLERANCE)
+    monkeypatch.setattr(baselines, "PART", 7)
+    parts = seal_ratio(planes.cloud, planes.mask, SEAL_RADIUS, TOLERANCE)
+    np.testing.assert_array_equal(parts, whole)
 
 
 def test_seal_ratio_regressor_beats_the_mean_on_planes_with_holes() -> None:
