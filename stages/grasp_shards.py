@@ -7,7 +7,7 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Int
 from loguru import logger
 
 from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact
@@ -16,6 +16,7 @@ from pipeline.config import RunConfig
 from pipeline.errors import SceneError
 from pipeline.execution import generator
 from pipeline.execution.items import item_key
+from pipeline.labelling.balancing import TENTHS, quality_histogram
 from pipeline.labelling.scene import label_scene, scene_surfaces
 from pipeline.labelling.shown_pads import drape_some_again
 from pipeline.messages.grasps import (
@@ -65,7 +66,7 @@ class ShardResult:
     """What the driver needs to know of a finished shard."""
 
     entry: ShardEntry  # the digest is taken where the file was written
-    quality: Float[np.ndarray, " n"]
+    histogram: Int[np.ndarray, " tenths"]  # of its grasps by tenth of q
     object_names: tuple[str, ...]
     status: dict[str, int]
     taken_over: int = 0  # portions
@@ -142,16 +143,15 @@ class LabelledWorld:
 
 def examined(job: ShardJob) -> ShardResult:
     """What a finished shard holds, read back from the file itself."""
-    quality, names, split = [], set(), ""
+    histogram, names, split = np.zeros(TENTHS, dtype=np.int64), set(), ""
     status: Counter[str] = Counter()
     with open_artifact(job.shard) as artifact:
         for origin, grasps in read_grasps(artifact, clouds=False):
             split = origin.split
-            quality.append(grasps.quality)
+            histogram += quality_histogram(grasps.quality)
             names |= {origin.object_names[i] for i in np.unique(grasps.object_index)}
             status.update(origin.status_names[s] for s in grasps.status)
     # A shard of a scene that was left out holds no grasp to tell the split.
     split = split or LabelledWorld(job).scene.split
-    all_q = np.concatenate(quality) if quality else np.empty(0)
-    entry = shard_entry(job.shard, job.shard.parent.parent, len(all_q), split)
-    return ShardResult(entry, all_q, tuple(sorted(names)), dict(status))
+    entry = shard_entry(job.shard, job.shard.parent.parent, int(histogram.sum()), split)
+    return ShardResult(entry, histogram, tuple(sorted(names)), dict(status))

@@ -10,13 +10,13 @@ from collections import Counter
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Int
 
 from pipeline.artifacts.sharding import shard_path, write_index
 from pipeline.config import RunConfig
 from pipeline.execution import StageContext, Summary, progress, run_in_order, stage_command
 from pipeline.execution.driver_cost import driver_cost
 from pipeline.execution.items import grasps_basis
-from pipeline.labelling.balancing import quality_histogram
 from pipeline.labelling.scene import noise_draws
 from pipeline.labelling.shown_pads import SHOWN_SCENES
 from pipeline.messages.grasps import portions_by_key
@@ -55,17 +55,17 @@ def build(stage: StageContext) -> Summary:
         synthesize_shard, jobs, stage.workers, stage.executor, limit_s=stage.item_limit_s
     )
     results = list(progress(done, count, "grasps", "scene"))
-    quality = np.concatenate([result.quality for result in results])
+    histogram = np.sum([result.histogram for result in results], axis=0)
     stage.drawing.seconds += sum(result.recording_s for result in results)
     entries = [result.entry for result in results]
-    write_index(stage.output, provenance, entries, quality_histogram(quality))
+    write_index(stage.output, provenance, entries, histogram)
     taken_over = sum(result.taken_over for result in results)
     made = sum(len(job.portions) for job in jobs) - taken_over
     grown = {"taken_over": taken_over, "made": made, "items_basis": basis}
     spent_s = sum(result.spent_s for result in results)
     driver_s = time.process_time() - began - (0.0 if stage.has_workers else spent_s)
-    cost = driver_cost(driver_s, spent_s, sum(len(r.quality) for r in results if r.spent_s))
-    return summary(results, quality, config) | grown | cost
+    cost = driver_cost(driver_s, spent_s, sum(r.entry.samples for r in results if r.spent_s))
+    return summary(results, histogram, config) | grown | cost
 
 
 def former_portions(stage: StageContext, basis: str) -> dict[tuple[int, int], Path]:
@@ -84,15 +84,17 @@ def former_portions(stage: StageContext, basis: str) -> dict[tuple[int, int], Pa
     }
 
 
-def summary(results: list[ShardResult], quality: np.ndarray, config: RunConfig) -> Summary:
+def summary(
+    results: list[ShardResult], histogram: Int[np.ndarray, " tenths"], config: RunConfig
+) -> Summary:
     """The stage's headline figures."""
     status: Counter[str] = Counter()
     for result in results:
         status.update(result.status)
     return {
-        "grasps": sum(len(r.quality) // noise_draws(r.entry.split, config) for r in results),
-        "clouds": len(quality),
-        "quality_histogram": quality_histogram(quality).tolist(),
+        "grasps": sum(r.entry.samples // noise_draws(r.entry.split, config) for r in results),
+        "clouds": int(histogram.sum()),
+        "quality_histogram": histogram.tolist(),
         "status": dict(sorted(status.items())),
         "objects": len({name for result in results for name in result.object_names}),
         "scenes": len(results),
