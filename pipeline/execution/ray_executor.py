@@ -19,13 +19,14 @@ from types import ModuleType
 from typing import Any, TypeVar
 
 from pipeline.errors import MachineError, SoftgripError
-from pipeline.execution.executors import too_long, wait_s
+from pipeline.execution.executors import too_long
 from pipeline.execution.ray_cluster import MOST_RETRIES, connected, enter
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 AHEAD_PER_CPU = 2  # items in flight, so that a slow driver bounds memory
+NODE_BACK_WITHIN_S = 120.0  # a node that starts anew takes a minute or so
 
 
 @dataclass(frozen=True)
@@ -155,17 +156,33 @@ def result_of(sent: Any, program: str, limit_s: float) -> Any:
     Raises
     ------
     SoftgripError
-        It took longer; what the item raises itself arrives as it was raised.
+        It took longer, or no node is left; what the item raises itself arrives as it was raised.
     """
     import ray
     from ray.exceptions import GetTimeoutError, RayTaskError
 
-    try:
-        return unpickled(ray.get(sent, timeout=wait_s(limit_s)), {program: "__main__"})
-    except GetTimeoutError as error:
-        raise too_long(limit_s) from error
-    except RayTaskError as error:
-        raise error.cause from error
+    waited_s, without_nodes = 0.0, 0
+    while True:
+        patience_s = min(NODE_BACK_WITHIN_S, limit_s - waited_s)
+        try:
+            return unpickled(ray.get(sent, timeout=patience_s), {program: "__main__"})
+        except GetTimeoutError as error:
+            waited_s += patience_s
+            without_nodes = 0 if any(map(_works, ray.nodes())) else without_nodes + 1
+            if without_nodes > 1:  # at two looks: one that starts anew is missing at one
+                raise SoftgripError(
+                    f"No node of the Ray cluster is left to work, for {NODE_BACK_WITHIN_S:g} s now",
+                    "Start nodes, then run the same command again, it goes on where it stopped",
+                ) from error
+            if waited_s >= limit_s:
+                raise too_long(limit_s) from error
+        except RayTaskError as error:
+            raise error.cause from error
+
+
+def _works(node: dict[str, Any]) -> bool:
+    """Whether a node, as Ray tells it, lives and takes items."""
+    return bool(node["Alive"] and node["Resources"].get("CPU"))
 
 
 def job_by_name(job: Callable[[Item], Result]) -> JobByName:

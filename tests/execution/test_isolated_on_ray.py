@@ -4,7 +4,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from pipeline.execution import Isolation, Lost
+from pipeline.errors import SoftgripError
+from pipeline.execution import Isolation, Lost, run_in_order
 from tests.execution.test_isolated import FATES, PLENTY, fate
 
 cluster_utils = pytest.importorskip("ray.cluster_utils", reason="Ray is not installed")
@@ -42,3 +43,5 @@ def test_a_task_that_ray_kills_for_its_node_s_memory_is_lost() -> None:
     with Isolation(1, PLENTY, "ray") as apart:
         (outcome,) = apart.run_in_order(fate, ["never end"])
     assert outcome == Lost("took the memory of its node")
+    with pytest.raises(SoftgripError, match=r"of memory again and again.*goes on where it stopped"):
+        list(run_in_order(fate, ["never end"], 1, "ray"))

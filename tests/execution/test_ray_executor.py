@@ -13,8 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.errors import MachineError
-from pipeline.execution.ray_executor import job_by_name
+from pipeline.errors import MachineError, SoftgripError
+from pipeline.execution.ray_executor import NODE_BACK_WITHIN_S, job_by_name, result_of
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -80,3 +80,33 @@ def test_a_function_that_no_name_leads_to_is_refused() -> None:
     for job in (inner, lambda item: item, partial(inner), "a".join):
         with pytest.raises(MachineError, match=r"cannot run on a cluster.*top level"):
             job_by_name(job)
+
+
+WORKS = {"Alive": True, "Resources": {"CPU": 8.0}}
+HEAD = {"Alive": True, "Resources": {}}  # takes no work
+GONE = WORKS | {"Alive": False}
+
+
+@pytest.mark.parametrize(
+    ("looks", "said", "waits"),
+    [
+        ([[HEAD, GONE]] * 9, r"No node .* is left to work.*goes on where it stopped", 2),
+        ([[HEAD, WORKS]] * 9, r"A work item took longer than 600 s: its worker hangs", 5),
+        ([[GONE], [WORKS], [GONE], [WORKS], [WORKS]], "took longer than 600 s", 5),
+    ],
+)
+def test_where_no_node_comes_back_it_is_said_long_before_an_item_may_hang(
+    monkeypatch: pytest.MonkeyPatch, looks: list[list[dict[str, object]]], said: str, waits: int
+) -> None:
+    ray = pytest.importorskip("ray", reason="Ray is not installed")
+    waited: list[float] = []
+
+    def get(_: object, timeout: float) -> bytes:
+        waited.append(timeout)
+        raise ray.exceptions.GetTimeoutError
+
+    monkeypatch.setattr(ray, "get", get)
+    monkeypatch.setattr(ray, "nodes", lambda: looks[len(waited) - 1])
+    with pytest.raises(SoftgripError, match=said):
+        result_of(None, "program", limit_s=5 * NODE_BACK_WITHIN_S)
+    assert waited == [NODE_BACK_WITHIN_S] * waits

@@ -45,21 +45,30 @@ def kill_when(stage: str, folder: RunFolder, moment: Callable[[float], bool]) ->
     return process.wait()
 
 
-def test_killed_in_every_stage_it_ends_with_the_same_bytes(run: RunFolder, tmp_path: Path) -> None:
-    folder = RunFolder(tmp_path / "tiny")
-    folder.path.mkdir()
+def test_killed_in_every_stage_and_started_elsewhere_it_ends_with_the_same_bytes(
+    run: RunFolder, tmp_path: Path
+) -> None:
+    """Elsewhere: where another machine sees the folder that all share, under another path."""
+    runs = tmp_path / "here"
+    folder = RunFolder(runs / "tiny")
+    folder.path.mkdir(parents=True)
     folder.config.write_text(TINY)
     killed = 0
-    for stage in STAGES:
+    for number, stage in enumerate(STAGES):
         piece = FIRST_PIECE.get(stage)
 
         def moment(
-            elapsed_s: float, piece: str | None = piece, after_s: float = MOMENTS_S.get(stage, 0.0)
+            elapsed_s: float,
+            path: Path = folder.path,
+            piece: str | None = piece,
+            after_s: float = MOMENTS_S.get(stage, 0.0),
         ) -> bool:
-            return any(folder.path.glob(piece)) if piece else elapsed_s > after_s
+            return any(path.glob(piece)) if piece else elapsed_s > after_s
 
         killed += kill_when(stage, folder, moment) == -signal.SIGKILL
-        done = run_stage(stage, tmp_path, workers=2)
+        runs = runs.rename(tmp_path / f"seen_by_machine_{number}")
+        folder = RunFolder(runs / "tiny")
+        done = run_stage(stage, runs, workers=2)
         assert done.returncode == 0, done.stderr[-3000:]
     assert killed >= 3
     assert digests(folder) == digests(run)
