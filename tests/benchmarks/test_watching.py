@@ -62,7 +62,9 @@ def test_the_picture_keeps_peaks_and_the_table_says_them(tmp_path: Path) -> None
     assert max(sample.largest_worker_mib for sample in shown) == 900.0
     written = tmp_path / "watched.jsonl"
     spent = Spent("grasps", 12.0, 20.0, 900.0)
-    written.write_text("".join(json.dumps(asdict(one)) + "\n" for one in [*looks, spent]))
+    written.write_text(
+        "".join(json.dumps(row) + "\n" for row in [*map(asdict, looks), asdict(spent)])
+    )
     assert read_watched(written) == (looks, [spent])
     assert "| grasps | 12 | 20 | 100, 900 |" in table(looks, [spent])
     assert "</svg>" in memory_picture(looks)

@@ -21,7 +21,8 @@ def unseen(run: RunFolder, tmp_path: Path) -> ShardJob:
     grasps = config.grasps.model_copy(update={"seen_angle_max_rad": 1e-9})
     return ShardJob(
         scene_index=0,
-        portions=(Portion(0, 10, "a key", None),),
+        portions=(Portion(0, 10, None),),
+        basis="a basis",
         pads=2,
         shard=tmp_path / "shard.mcap",
         objects=run.artifact("objects"),
@@ -44,8 +45,9 @@ def test_where_clutters_may_be_left_out_its_shard_is_empty_and_says_so(unseen: S
     sink = logger.add(told.append, format="{message}")
     made, found_again = synthesize_shard(job), synthesize_shard(job)
     logger.remove(sink)
-    assert len(made.quality) == len(found_again.quality) == 0
-    assert made.split == found_again.split == "train"
+    assert made.entry.samples == made.histogram.sum() == 0
+    assert made.entry == found_again.entry
+    assert made.entry.split == "train"
     assert len(told) == 1
     assert told[0].startswith("left out: No camera of scene")
     assert shown_grasps((), job.shard) == []
