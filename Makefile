@@ -29,7 +29,7 @@ ifeq (,$(strip $(WORKERS)))
 unexport WORKERS
 endif
 
-.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader test bench gallery scenarios referee holdout folds release review report export predict real sensors calibrate live robot board docs lint fuzz regress plan list prune seal unseal query diff publish expect clean FORCE
+.PHONY: help dataset objects scenes grasps shards train sweep eval evaluate status doctor setup reader s3 pull test bench gallery scenarios referee holdout folds release review report export predict real sensors calibrate live robot board docs lint fuzz regress plan list prune seal unseal query diff publish expect clean FORCE
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## /{printf "  make %-10s %s\n", $$1, $$2}' $(firstword $(MAKEFILE_LIST))
@@ -75,7 +75,10 @@ FORCE:
 
 status: .venv/.ready  ## what is stale, and why; with EXECUTOR=ray what the cluster's nodes have
 	@$(PY) -m stages.freshness status
+	@$(PY) -m stages.store look
 	@$(if $(filter ray,$(EXECUTOR)),$(PY) -m stages.cluster)
+pull: .venv/.ready  ## bring RUN from its object store (RUN_STORE=s3://bucket/prefix, or run.toml) to its folder
+	@$(PY) -m stages.store pull
 
 plan: .venv/.ready  ## what 'make GOAL' will do, about how long and how much disk: GOAL=dataset|train|eval
 	@$(PY) -m stages.freshness plan $(or $(GOAL),eval)
@@ -115,10 +118,18 @@ $(NODE_READER): tests/artifacts/node/package-lock.json
 	  npm ci --prefix $(<D) --ignore-scripts --no-audit --no-fund --silent && touch $@; \
 	else echo "npm is not installed: artifacts are not checked by the TypeScript reader"; fi
 
+# The S3 server that the tests speak to, in an environment of its own: see its requirements.
+S3 := tests/artifacts/s3
+s3: $(S3)/.venv/.ready
+$(S3)/.venv/.ready: $(S3)/requirements.txt
+	@$(PYTHON3) -m venv $(@D) && \
+	  $(@D)/bin/python -m pip install --quiet --disable-pip-version-check -r $< && touch $@ || \
+	  echo "The S3 server could not be installed: the tests that speak to it are skipped"
+
 doctor:  ## what is present, what is missing, how to mend it
 	@$$(test -x $(PY) && echo $(PY) || echo $(PYTHON3)) -m pipeline.machine.doctor
 
-test: .venv/.ready lint reader  ## lint, types, tests
+test: .venv/.ready lint reader s3  ## lint, types, tests
 	OMP_WAIT_POLICY=PASSIVE $(PY) -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 
 bench: .venv/.ready  ## speed of labelling, QP, storage and control, to runs/bench/bench.json

@@ -63,3 +63,7 @@ class QueryError(SoftgripError):
 
 class MachineError(SoftgripError):
     """The machine lacks something that a stage needs."""
+
+
+class StoreError(SoftgripError):
+    """The object store in which a run lies cannot be used."""

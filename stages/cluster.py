@@ -12,6 +12,7 @@ import typer
 from pipeline.config import load_run_config
 from pipeline.execution.commands import EXIT_FAILURE, run_command
 from pipeline.execution.ray_cluster import Node, cluster_nodes, what_is_here
+from pipeline.execution.run_store import place_of
 from pipeline.execution.stage import RunFolder
 from stages.graph import RUNS_DIR, STAGES
 
@@ -21,9 +22,11 @@ def cluster(
     runs_dir: Annotated[Path, typer.Option(help="folder of all runs")] = RUNS_DIR,
 ) -> None:
     """Print every node of the cluster; non-zero where one lacks something."""
-    asked = load_run_config(RunFolder(runs_dir / run).config).cameras.renderer
+    folder = RunFolder(runs_dir / run)
+    config = load_run_config(folder.config)
+    asked, common = config.cameras.renderer, place_of(folder, config.store) is None
     modules = [stage.module for stage in STAGES.values()]
-    nodes = cluster_nodes(what_is_here(modules, asked), modules, asked)
+    nodes = cluster_nodes(what_is_here(modules, asked), modules, asked, common)
     sys.stdout.write("\n".join(as_lines(nodes)) + "\n")
     if any(node.lacks for node in nodes):
         sys.exit(EXIT_FAILURE)

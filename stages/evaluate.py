@@ -72,8 +72,8 @@ def build(stage: StageContext) -> Summary:
     # A policy, a clutter and a scale that both ask for are one job.
     jobs = {job.path: job for part in (contest, *curve.values()) for job in part}
     rated = clutter_jobs(stage, rated_scenes(stage), (None,), robot.scale)
-    every, limit_s = [*jobs.values(), *rated], stage.item_limit_s
-    done = run_in_order(work, every, stage.workers, stage.executor, limit_s=limit_s)
+    every, limit_s, store = [*jobs.values(), *rated], stage.item_limit_s, stage.store
+    done = run_in_order(work, every, stage.workers, stage.executor, limit_s=limit_s, store=store)
     list(progress(done, len(jobs) + len(rated), "evaluate: clutters", "clutter"))
     attempts = made_in(contest, Attempt)
     results = results_of(scenes, wanted.policies, attempts, accelerations)

@@ -1,6 +1,4 @@
-"""What Make asks: which stages are stale and why, and what a make will take.
-
-``key STAGE`` rewrites a stage's key file only when its digest changed; ``status`` says what is
+"""What Make asks: ``key STAGE`` rewrites a key file if its digest changed; ``status`` says what is
 stale and why; ``plan GOAL`` says what a make will do, about how long it takes and how much disk.
 """
 
@@ -17,6 +15,7 @@ from pipeline.artifacts import publish_bytes
 from pipeline.config import load_run_config
 from pipeline.errors import ArtifactError, ConfigError
 from pipeline.execution.commands import run_command
+from pipeline.execution.run_store import fetch_configuration
 from pipeline.execution.sealing import is_sealed
 from pipeline.execution.stage import RunFolder, Stage, StageContext
 from pipeline.execution.staleness import (
@@ -47,6 +46,7 @@ MeshDir = Annotated[Path | None, typer.Option(envvar="MESH_DIR")]
 def key(stage: str, run: RunName = "default", mesh_dir: MeshDir = None) -> None:
     """Rewrite a stage's key file if what it depends on changed; of a sealed run never."""
     folder = RunFolder(RUNS_DIR / run)
+    fetch_configuration(folder)
     if is_sealed(folder):
         _keep_sealed(folder, stage)
         return

@@ -51,8 +51,9 @@ def build(stage: StageContext) -> Summary:
         )
         for index, portions in enumerate(config.grasps.of_scenes(count))
     ]
+    limit_s, store = stage.item_limit_s, stage.store
     done = run_in_order(
-        synthesize_shard, jobs, stage.workers, stage.executor, limit_s=stage.item_limit_s
+        synthesize_shard, jobs, stage.workers, stage.executor, limit_s=limit_s, store=store
     )
     results = list(progress(done, count, "grasps", "scene"))
     histogram = np.sum([result.histogram for result in results], axis=0)

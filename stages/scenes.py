@@ -79,13 +79,12 @@ def make_scenes(
     """
     left_out: dict[str, str] = {}
     missing = [job for job in jobs if job.scene_id not in kept]
+    limit_s, store = stage.item_limit_s, stage.store
     settled = run_in_order(
-        settled_clutter, missing, stage.workers, stage.executor, AHEAD, stage.item_limit_s
+        settled_clutter, missing, stage.workers, stage.executor, AHEAD, limit_s, store
     )
     asked, built = stage.config.cameras.renderer, zip(missing, settled, strict=True)
-    rendered = run_on_rendering_nodes(
-        rendered_scene, built, stage.executor, asked, stage.item_limit_s
-    )
+    rendered = run_on_rendering_nodes(rendered_scene, built, stage.executor, asked, limit_s, store)
     made = iter(progress(rendered, len(missing), "scenes", "scene"))
     renderer = renderer_of(stage.config).name
     scenes: list[ClutterScene] = []

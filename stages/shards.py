@@ -47,7 +47,8 @@ def build(stage: StageContext) -> Summary:
         )
         for part in plan.parts
     ]
-    done = run_in_order(gather, jobs, workers, stage.executor, limit_s=stage.item_limit_s)
+    limit_s, store = stage.item_limit_s, stage.store
+    done = run_in_order(gather, jobs, workers, stage.executor, limit_s=limit_s, store=store)
     gathered = list(progress(done, len(jobs), "shards: permuting", "part"))
     entries = [entry for found in gathered for entry in found.entries]
     histogram = np.sum([found.quality for found in gathered], axis=0)
@@ -57,6 +58,8 @@ def build(stage: StageContext) -> Summary:
         keep_rows("samples", stage.output, stage.folder.state(QUERY_CACHE), rows)
     stage.checking.seconds += sum(found.rows_s for found in gathered)
     shutil.rmtree(scattered(stage).parent)
+    if store is not None:
+        store.discard(scattered(stage).parent)
     return summary(plan.parts, gathered, names)
 
 
@@ -85,7 +88,15 @@ def scatter(stage: StageContext, plan: ShufflePlan, workers: int) -> tuple[str, 
     grasps_bytes = sum(s.path.stat().st_size for job in missing for s in job.sources)
     at_once = min(1.0, workers / len(plan.parts)) if stage.executor == "local" else 1.0
     require_room(folder, int(grasps_bytes * (1 + at_once)), "Shuffling")
-    done = run_in_order(scatter_group, jobs, workers, stage.executor, limit_s=stage.item_limit_s)
+    done = run_in_order(
+        scatter_group,
+        jobs,
+        workers,
+        stage.executor,
+        limit_s=stage.item_limit_s,
+        store=stage.store,
+        bring=False,  # gathered from the store
+    )
     found = list(progress(done, len(jobs), "shards: reading grasps", "group"))
     # Whatever one shard names, all do: names are known before the first is written.
     return object_names_in(named) if named else tuple(dict.fromkeys(n for f in found for n in f))

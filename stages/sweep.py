@@ -72,7 +72,14 @@ def build(stage: StageContext) -> Summary:
     config = stage.config
     given = given_samples(config, stage.upstream("shards"))
     jobs = member_jobs(stage)
-    done = run_in_order(train_member, jobs, stage.workers, stage.executor, ahead_per_worker=64)
+    done = run_in_order(
+        train_member,
+        jobs,
+        stage.workers,
+        stage.executor_alone,
+        ahead_per_worker=64,
+        store=stage.store,
+    )
     parts = list(progress(done, len(jobs), "sweep: networks", "network"))
     networks = [network for part in parts for network in read_sweep(part)]
     mark_networks(networks, config.network)

@@ -69,10 +69,21 @@ def published(path: Path) -> Iterator[Path]:
 
 def scratch_beside(path: Path) -> Path:
     """A new hidden name beside ``path`` for a scratch file; it holds this machine and process."""
-    writer = f"{_machine()}-{os.getpid()}-{_start_of(os.getpid())}-{secrets.token_hex(4)}"
-    ending = f".{writer}{SCRATCH_SUFFIX}"
+    ending = f".{this_process()}-{secrets.token_hex(4)}{SCRATCH_SUFFIX}"
     room = LONGEST_NAME_BYTES - len(ending) - 1
     return path.with_name(f".{path.name.encode()[:room].decode(errors='ignore')}{ending}")
+
+
+def this_process() -> str:
+    """A name of this process that no other has, on any machine."""
+    return f"{_machine()}-{os.getpid()}-{_start_of(os.getpid())}"
+
+
+def has_ended(process: str) -> bool:
+    """Whether a process, named by `this_process`, was of this machine and is no more."""
+    machine, _, rest = process.partition("-")
+    pid, _, start = rest.partition("-")
+    return machine == _machine() and _start_of(int(pid)) != int(start)
 
 
 def remove_abandoned_scratch(folder: Path) -> list[Path]:

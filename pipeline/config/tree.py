@@ -48,6 +48,7 @@ from pipeline.config.predict import PredictConfig
 from pipeline.config.referee import RefereeConfig
 from pipeline.config.scenes import ScenesConfig
 from pipeline.config.section import Section, with_radius
+from pipeline.config.store import StoreConfig
 from pipeline.errors import ConfigError
 
 # A key a.a.a... costs its reader the square of its parts; strings may hold any number of dots.
@@ -98,6 +99,7 @@ class RunConfig(Section):
     predict: PredictConfig = PredictConfig()
     recording: RecordingConfig = RecordingConfig()
     dataset: DatasetConfig = DatasetConfig()
+    store: StoreConfig = StoreConfig()
     expect: tuple[Expectation, ...] = Field(
         (), description="further expectations, beside those that hold for every run"
     )

@@ -17,6 +17,7 @@ DRAWING = ("pipeline.recording",)  # what only draws: no result may be from it
 # changes with every word that a person is told.
 RUNNING = (
     "pipeline.artifacts.digests",
+    "pipeline.artifacts.object_store",
     "pipeline.asking",
     "pipeline.config.expectations",
     "pipeline.execution.code",
@@ -24,9 +25,12 @@ RUNNING = (
     "pipeline.execution.freshness",
     "pipeline.execution.packages",
     "pipeline.execution.renderer",
+    "pipeline.execution.run_store",
     "pipeline.execution.running",
     "pipeline.execution.sealing",
     "pipeline.execution.staleness",
+    "pipeline.execution.store_lease",
+    "pipeline.execution.stored_items",
     "pipeline.interchange.foxglove_layouts",
     "pipeline.progress",
     "pipeline.stopwatch",

@@ -19,6 +19,7 @@ from types import FrameType
 from typing import Any, Literal, TypeVar
 
 from pipeline.errors import SoftgripError
+from pipeline.execution.run_store import RunStore
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -37,6 +38,8 @@ def run_in_order(
     executor: Executor = "local",
     ahead_per_worker: int = AHEAD_PER_WORKER,
     limit_s: float = math.inf,
+    store: RunStore | None = None,
+    bring: bool = True,
 ) -> Iterator[Result]:
     """Compute ``job(item)`` for every item, in worker processes or on a Ray cluster.
 
@@ -59,6 +62,11 @@ def run_in_order(
     limit_s
         How long an item may be waited for once all before it are done [s]; work in this process
         has no limit.
+    store
+        Where nodes find the run's files, and files made here are put meanwhile; None: the run lies
+        in its folder.
+    bring
+        Whether files that nodes put in the store come to the run's folder here.
 
     Yields
     ------
@@ -73,8 +81,27 @@ def run_in_order(
     if executor == "ray":
         from pipeline.execution.ray_executor import run_on_ray  # an optional package
 
-        yield from run_on_ray(job, items, limit_s=limit_s)
+        yield from run_on_ray(job, items, limit_s=limit_s, store=store, bring=bring)
         return
+    yield from put_meanwhile(_in_processes(job, items, workers, ahead_per_worker, limit_s), store)
+
+
+def put_meanwhile(results: Iterator[Result], store: RunStore | None) -> Iterator[Result]:
+    """Results of this machine's processes as they come; what they write is put in the store."""
+    for result in results:
+        yield result
+        if store is not None:
+            store.put_now_and_then()
+
+
+def _in_processes(
+    job: Callable[[Item], Result],
+    items: Iterable[Item],
+    workers: int,
+    ahead_per_worker: int,
+    limit_s: float,
+) -> Iterator[Result]:
+    """Results of worker processes in the order of the items; of one worker, of this process."""
     if workers <= 1:
         yield from map(job, items)
         return

@@ -114,7 +114,9 @@ def connected() -> Iterator[ModuleType]:
             ray.shutdown()
 
 
-def cluster_nodes(here: Found, modules: Sequence[str], asked: RendererName) -> list[Node]:
+def cluster_nodes(
+    here: Found, modules: Sequence[str], asked: RendererName, common_folder: bool = True
+) -> list[Node]:
     """Every living node that takes work, with what it lacks for the work of this driver.
 
     Parameters
@@ -125,6 +127,8 @@ def cluster_nodes(here: Found, modules: Sequence[str], asked: RendererName) -> l
         The programs whose jobs run there, dotted.
     asked
         The renderer that the configuration asks for.
+    common_folder
+        Whether nodes work in the driver's folder; else with a project of their own.
 
     Returns
     -------
@@ -137,7 +141,7 @@ def cluster_nodes(here: Found, modules: Sequence[str], asked: RendererName) -> l
     """
     with connected() as ray:
         living = [node for node in ray.nodes() if node["Alive"] and node["Resources"].get("CPU")]
-        sent = str(Path.cwd()), list(modules), asked
+        sent = str(Path.cwd()) if common_folder else "", list(modules), asked
         looks = [
             on_node(ray, node["NodeID"], max_retries=0)(_look).remote(*sent) for node in living
         ]
@@ -270,9 +274,10 @@ def _answer(ray: ModuleType, look: Any) -> Found | str:
 # Ray pickles a function of ours by its name: the node must find it before it can look.
 def _look(folder: str, modules: list[str], asked: RendererName) -> str:
     """On a node: what is there, as JSON; a sentence where the driver's folder is not."""
-    if not (Path(folder) / "pipeline").is_dir():
+    if folder and not (Path(folder) / "pipeline").is_dir():
         return json.dumps(f"does not see the project under {folder}")
-    enter(folder)
+    if folder:
+        enter(folder)
     try:
         return json.dumps(asdict(what_is_here(modules, asked)))
     except MachineError as error:

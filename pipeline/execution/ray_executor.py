@@ -1,14 +1,13 @@
 """Work items on an existing Ray cluster, results in order, as from local processes.
 
-Every node must see the run's folder under the path it has here, and hold the same packages.
+Every node must hold the same packages, and see the run's folder under the path it has here; where
+the run lies in an object store, nodes take its files from there and see no folder of the driver.
 A job that dies with its node is made again on another: jobs keep what is already whole. So is one
 that Ray ends because its node runs out of memory, as often.
 """
 
 import importlib
-import io
 import math
-import pickle
 import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
@@ -21,6 +20,8 @@ from typing import Any, TypeVar
 from pipeline.errors import MachineError, SoftgripError
 from pipeline.execution.executors import too_long
 from pipeline.execution.ray_cluster import MOST_RETRIES, connected, enter
+from pipeline.execution.run_store import Place, RunStore
+from pipeline.execution.stored_items import Done, packed, run_from_store, unpacked
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -59,6 +60,8 @@ def run_on_ray(
     items: Iterable[Item],
     lost: Callable[[str], Result] | None = None,
     limit_s: float = math.inf,
+    store: RunStore | None = None,
+    bring: bool = True,
 ) -> Iterator[Result]:
     """Compute ``job(item)`` for every item on a Ray cluster, one CPU each.
 
@@ -74,6 +77,10 @@ def run_on_ray(
         Makes the result of an item that cost every worker its life, from what became of it.
     limit_s
         How long an item may be waited for once all before it are done [s].
+    store
+        Where nodes find the run's files; None: in its folder, as this process does.
+    bring
+        Whether the files that nodes put in the store come to the run's folder here.
 
     Yields
     ------
@@ -90,7 +97,7 @@ def run_on_ray(
     """
     named = job_by_name(job)
     with connected() as ray:
-        yield from _in_order(ray, named, items, lost, limit_s)
+        yield from _in_order(ray, named, items, lost, limit_s, Sending(store, bring))
 
 
 def _in_order(
@@ -99,27 +106,59 @@ def _in_order(
     items: Iterable[Item],
     lost: Callable[[str], Result] | None,
     limit_s: float,
+    sending: "Sending",
 ) -> Iterator[Result]:
     """Results in the order of the items, of a bounded number of items in flight."""
     remote = ray.remote(num_cpus=1, max_retries=MOST_RETRIES)(_run_there)
-    there, program = str(Path.cwd()), program_name()
     ahead = AHEAD_PER_CPU * max(1, int(ray.cluster_resources().get("CPU", 1)))
     waiting: deque[Any] = deque()
     for item in items:
-        waiting.append(remote.remote(pickle.dumps((named, item)), there, program))
+        waiting.append(remote.remote(*sending.message(named, item)))
         if len(waiting) >= ahead:
-            yield _result(waiting.popleft(), program, lost, limit_s)
+            yield _result(waiting.popleft(), sending, lost, limit_s)
     while waiting:
-        yield _result(waiting.popleft(), program, lost, limit_s)
+        yield _result(waiting.popleft(), sending, lost, limit_s)
 
 
-def _result(sent: Any, program: str, lost: Callable[[str], Any] | None, limit_s: float) -> Any:
+@dataclass(frozen=True)
+class Sending:
+    """How items reach nodes, and results come back.
+
+    Attributes
+    ----------
+    store
+        Where nodes find the run's files; None: in the folder that this process works in.
+    bring
+        Whether the files that nodes put in the store come to the run's folder here.
+    """
+
+    store: RunStore | None = None
+    bring: bool = True
+
+    def message(self, job: JobByName, item: Any) -> tuple[bytes, str | Place, str]:
+        """What `_run_there` is given."""
+        if self.store is None:
+            return packed((job, item), None), str(Path.cwd()), program_name()
+        return packed((job, item), self.store.folder.path), self.store.place, program_name()
+
+    def result(self, answer: bytes) -> Any:
+        """What the job made; files that its node put in the store are here."""
+        names = {program_name(): "__main__"}
+        if self.store is None:
+            return unpacked(answer, names)
+        done: Done = unpacked(answer, names, self.store.folder.path.joinpath)
+        if self.bring:
+            self.store.bring(done.keys)
+        return done.result
+
+
+def _result(sent: Any, sending: Sending, lost: Callable[[str], Any] | None, limit_s: float) -> Any:
     """The result of an item, waited for; a worker's death after all retries is told or ``lost``."""
     import ray
     from ray.exceptions import GetTimeoutError, OutOfMemoryError, WorkerCrashedError
 
     try:
-        return result_of(sent, program, limit_s)
+        return result_of(sent, sending, limit_s)
     except SoftgripError as error:
         if isinstance(error.__cause__, GetTimeoutError):
             ray.cancel(sent, force=True)
@@ -137,15 +176,15 @@ def _result(sent: Any, program: str, lost: Callable[[str], Any] | None, limit_s:
         ) from error
 
 
-def result_of(sent: Any, program: str, limit_s: float) -> Any:
+def result_of(sent: Any, sending: Sending, limit_s: float) -> Any:
     """What `_run_there` made of an item, waited for.
 
     Parameters
     ----------
     sent
         Ray's reference to the result.
-    program
-        Module that is ``__main__`` here.
+    sending
+        How it was sent.
     limit_s
         How long it may be waited for [s].
 
@@ -165,7 +204,7 @@ def result_of(sent: Any, program: str, limit_s: float) -> Any:
     while True:
         patience_s = min(NODE_BACK_WITHIN_S, limit_s - waited_s)
         try:
-            return unpickled(ray.get(sent, timeout=patience_s), {program: "__main__"})
+            return sending.result(ray.get(sent, timeout=patience_s))
         except GetTimeoutError as error:
             waited_s += patience_s
             without_nodes = 0 if any(map(_works, ray.nodes())) else without_nodes + 1
@@ -229,12 +268,12 @@ def program_name() -> str:
 class Worker:
     """A process on a node that works on one item after the other."""
 
-    def run(self, sent: bytes, folder: str, program: str) -> bytes:
+    def run(self, sent: bytes, place: str | Place, program: str) -> bytes:
         """On the node: as `_run_there`."""
-        return _run_there(sent, folder, program)
+        return _run_there(sent, place, program)
 
 
-def _run_there(sent: bytes, folder: str, program: str) -> bytes:
+def _run_there(sent: bytes, place: str | Place, program: str) -> bytes:
     """On a node: a pickled job and item in, its pickled result out.
 
     Ray's own pickling would take the classes of a program along; there, they would be others than
@@ -244,8 +283,8 @@ def _run_there(sent: bytes, folder: str, program: str) -> bytes:
     ----------
     sent
         `JobByName` and the item.
-    folder
-        That relative paths start from.
+    place
+        Folder that relative paths start from; or the store in which the run lies.
     program
         Module that is ``__main__`` where the item comes from.
 
@@ -253,16 +292,8 @@ def _run_there(sent: bytes, folder: str, program: str) -> bytes:
     -------
     What the job makes of the item.
     """
-    enter(folder)
-    job, item = unpickled(sent, {"__main__": program})
-    return pickle.dumps(job(item))
-
-
-def unpickled(data: bytes, renamed: dict[str, str]) -> Any:
-    """What was pickled by another process of this run, with modules by their names here."""
-
-    class Unpickler(pickle.Unpickler):
-        def find_class(self, module_name: str, global_name: str) -> Any:
-            return super().find_class(renamed.get(module_name, module_name), global_name)
-
-    return Unpickler(io.BytesIO(data)).load()
+    if isinstance(place, Place):
+        return run_from_store(sent, place, program)
+    enter(place)
+    job, item = unpacked(sent, {"__main__": program})
+    return packed(job(item), None)

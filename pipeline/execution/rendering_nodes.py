@@ -5,11 +5,9 @@ driver renders with, so that the bytes are the same. Other nodes are told and ge
 """
 
 import math
-import pickle
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
 
@@ -17,7 +15,8 @@ from loguru import logger
 
 from pipeline.config.cameras import RendererName
 from pipeline.errors import SoftgripError
-from pipeline.execution.executors import Executor
+from pipeline.execution.executors import Executor, put_meanwhile
+from pipeline.execution.run_store import RunStore
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -31,6 +30,7 @@ def run_on_rendering_nodes(
     executor: Executor,
     renderer: RendererName,
     limit_s: float = math.inf,
+    store: RunStore | None = None,
 ) -> Iterator[Result]:
     """Compute ``job(item)`` for every item, where there is a renderer.
 
@@ -47,6 +47,8 @@ def run_on_rendering_nodes(
     limit_s
         How long an item may be waited for once all before it are done [s]; work in this process
         has no limit.
+    store
+        Where nodes find the run's files; None: in its folder, as this process does.
 
     Yields
     ------
@@ -59,7 +61,7 @@ def run_on_rendering_nodes(
         Every node that could render is lost, or an item took longer than allowed.
     """
     if executor == "local":
-        yield from map(job, items)
+        yield from put_meanwhile(map(job, items), store)
         return
     from pipeline.execution.ray_cluster import (
         Node,
@@ -68,25 +70,30 @@ def run_on_rendering_nodes(
         on_node,
         what_is_here,
     )
-    from pipeline.execution.ray_executor import Worker, job_by_name  # Ray is an optional package
+    from pipeline.execution.ray_executor import (  # Ray is an optional package
+        Sending,
+        Worker,
+        job_by_name,
+    )
 
     named = job_by_name(job)
     with connected() as ray:
         able: list[Node] = []
         modules = [named.module]
-        for node in cluster_nodes(what_is_here(modules, renderer), modules, renderer):
+        here, seen = what_is_here(modules, renderer), store is None
+        for node in cluster_nodes(here, modules, renderer, seen):
             if node.lacks:
                 logger.warning("node {} renders nothing: {}", node.name, "; ".join(node.lacks))
             else:
                 able.append(node)
         if not able:
             logger.warning("no node of the cluster renders as this driver does: it renders itself")
-            yield from map(job, items)
+            yield from put_meanwhile(map(job, items), store)
             return
         # A renderer asks for no CPU: it shares its node's with other jobs.
         processes = [_Process(n.name, on_node(ray, n.node_id)(Worker).remote()) for n in able]
         try:
-            yield from _in_order(ray, named, items, processes, limit_s)
+            yield from _in_order(ray, named, items, processes, limit_s, Sending(store))
         finally:
             for process in processes:
                 ray.kill(process.actor)
@@ -107,24 +114,25 @@ def _in_order(
     items: Iterable[Any],
     processes: Sequence[_Process],
     limit_s: float,
+    sending: Any,
 ) -> Iterator[Any]:
     """Results in the order of the items; items of a process that is lost go to another."""
-    from pipeline.execution.ray_executor import program_name, result_of
+    from pipeline.execution.ray_executor import result_of
 
-    program, there, living = program_name(), str(Path.cwd()), list(processes)
-    waiting: deque[tuple[bytes, _Process, Any]] = deque()
+    living = list(processes)
+    waiting: deque[tuple[Any, _Process, Any]] = deque()
 
-    def sent(item: bytes) -> tuple[bytes, _Process, Any]:
+    def sent(message: Any) -> tuple[Any, _Process, Any]:
         chosen = min(living, key=lambda process: process.holds)
         chosen.holds += 1
-        return item, chosen, chosen.actor.run.remote(item, there, program)
+        return message, chosen, chosen.actor.run.remote(*message)
 
     def next_result() -> Any:
         while True:
-            item, process, ref = waiting.popleft()
+            message, process, ref = waiting.popleft()
             process.holds -= 1
             try:
-                return result_of(ref, program, limit_s)
+                return result_of(ref, sending, limit_s)
             except ray.exceptions.RayActorError as error:
                 if process in living:
                     living.remove(process)
@@ -134,10 +142,10 @@ def _in_order(
                         "Every node of the Ray cluster that renders is lost",
                         "Run the same command again, it goes on where it stopped",
                     ) from error
-                waiting.appendleft(sent(item))
+                waiting.appendleft(sent(message))
 
     for item in items:
-        waiting.append(sent(pickle.dumps((job, item))))
+        waiting.append(sent(sending.message(job, item)))
         if len(waiting) >= AHEAD_PER_NODE * len(living):
             yield next_result()
     while waiting:

@@ -7,7 +7,7 @@ import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
 from types import FrameType
@@ -20,9 +20,11 @@ from loguru import logger
 from pipeline.artifacts import open_artifact, publish_bytes, read_provenance
 from pipeline.artifacts.digests import MEMO
 from pipeline.artifacts.publishing import CANNOT_WRITE, remove_abandoned_scratch, write_error
+from pipeline.config import load_run_config
 from pipeline.errors import SoftgripError
 from pipeline.execution.commands import EXIT_FAILURE, log_to
 from pipeline.execution.executors import Executor
+from pipeline.execution.run_store import fetch_configuration, opened
 from pipeline.execution.sealing import is_sealed, refuse_sealed
 from pipeline.execution.stage import RunFolder, Stage, StageContext
 from pipeline.execution.staleness import (
@@ -93,15 +95,24 @@ def stage_command(
                 return
             # Of its own for each process: two would write one memo at once.
             memo = f"hashes.rank{rank}.json" if rank else MEMO
-            context = stage_context(stage, folder, inputs_of, mesh_dir, workers, memo)
-            context = replace(context, executor=executor, item_limit_s=item_limit_s)
+
+            def context_now() -> StageContext:
+                context = stage_context(stage, folder, inputs_of, mesh_dir, workers, memo)
+                return replace(context, executor=executor, item_limit_s=item_limit_s)
+
             if rank > 0:
+                context = context_now()
                 if force or not artifact_is_fresh(context):
                     build(context)
                 return
+            fetch_configuration(folder)
+            kept_in = load_run_config(folder.config).store
             refuse_sealed(folder)
-            with _exclusive(folder, stage):
-                run_stage(context, build, force, draw)
+            with _exclusive(folder, stage), opened(folder, kept_in, stage.name) as store:
+                refuse_sealed(folder)  # its seal may have come from the store
+                run_stage(replace(context_now(), store=store), build, force, draw)
+                if store is not None and (put := store.put()):
+                    logger.info("{}: {} files are in {}", stage.name, put, store.place.url)
 
     command.__doc__ = build.__doc__
     app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
@@ -116,9 +127,9 @@ def run_stage(
 
     Where the recording alone is stale, it is drawn anew and the artifact stays as it is.
     """
-    name, output = context.stage.name, context.output
+    name = context.stage.name
     if not force and is_fresh(context):
-        os.utime(output)  # Make compares dates: what is fresh by content is new by date
+        _renew_date(context)
         logger.info("{}: up to date, nothing to do", name)
         return
     started, spent_s = time.perf_counter(), processor_time_s()
@@ -128,7 +139,7 @@ def run_stage(
         context, _ = checked(context)
         draw_recording(context, draw, record)
         _publish_summary(context, record | _recording_size(context))
-        os.utime(output)
+        _renew_date(context)
         logger.info("{}: drawn in {:.1f} s", name, time.perf_counter() - started)
         return
     logger.info("{}: started ({} workers)", name, context.workers)
@@ -151,7 +162,14 @@ def run_stage(
     }
     _publish_summary(context, record)
     _publish_layout(context)
-    logger.info("{}: done in {:.1f} s, {}", name, wall_s, output)
+    logger.info("{}: done in {:.1f} s, {}", name, wall_s, context.output)
+
+
+def _renew_date(context: StageContext) -> None:
+    """Make compares dates: what is fresh by content is new by date."""
+    store = context.store
+    with store.same(context.output) if store is not None else nullcontext():
+        os.utime(context.output)
 
 
 def share_of(part: Stopwatch, spent_s: float) -> float:
@@ -221,6 +239,7 @@ def _publish_summary(context: StageContext, record: Summary) -> None:
 def _exclusive(folder: RunFolder, stage: Stage) -> Iterator[None]:
     """Let one process at a time work in a run; a second one fails with the name of the first."""
     owner = folder.state("owner")
+    owner.parent.mkdir(parents=True, exist_ok=True)
     lock = FileLock(folder.state("lock"))
     try:
         lock.acquire(timeout=0)

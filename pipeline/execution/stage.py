@@ -9,6 +9,8 @@ from pipeline.artifacts import Input, Provenance, package_version
 from pipeline.config import RunConfig
 from pipeline.execution.executors import Executor
 from pipeline.execution.freshness import Key
+from pipeline.execution.run_folder import RunFolder as RunFolder
+from pipeline.execution.run_store import RunStore
 from pipeline.stopwatch import Stopwatch
 
 
@@ -55,59 +57,6 @@ class Stage:
 
 
 @dataclass(frozen=True)
-class RunFolder:
-    """Paths of all files of one run."""
-
-    path: Path
-
-    def artifact(self, stage: str) -> Path:
-        """The MCAP a stage hands over (for a sharded stage: its index)."""
-        return self.path / f"{stage}.mcap"
-
-    def shards(self, stage: str) -> Path:
-        """The folder of a sharded stage's files."""
-        return self.path / stage
-
-    def recording(self, stage: str) -> Path:
-        """The Rerun recording of a stage."""
-        return self.path / f"{stage}.rrd"
-
-    def summary(self, stage: str) -> Path:
-        """The headline figures of a stage."""
-        return self.path / f"{stage}.summary.json"
-
-    def layout(self, stage: str) -> Path:
-        """The layout by which Foxglove shows a stage's artifact."""
-        return self.path / f"{stage}.foxglove.json"
-
-    def log(self, stage: str) -> Path:
-        """The log of a stage's last runs, traces included."""
-        return self.path / "logs" / f"{stage}.log"
-
-    def state(self, name: str) -> Path:
-        """Bookkeeping that is not a result: keys, hashes, resume points."""
-        return self.path / ".state" / name
-
-    @property
-    def noted_mesh_dir(self) -> Path | None:
-        """The mesh folder that Make noted in the run; None for the embedded objects."""
-        note = self.state("mesh_dir")
-        named = note.read_text().strip() if note.is_file() else ""
-        return Path(named) if named else None
-
-    @property
-    def cache(self) -> Path:
-        """Folder that all runs share, a run within a run too; all in it can be made again."""
-        within = (self.path.parent / "run.toml").is_file()
-        return (self.path.parent.parent if within else self.path.parent) / ".cache"
-
-    @property
-    def config(self) -> Path:
-        """The run's configuration."""
-        return self.path / "run.toml"
-
-
-@dataclass(frozen=True)
 class StageContext:
     """What a running stage is given.
 
@@ -131,6 +80,8 @@ class StageContext:
         Folder of meshes; None: the embedded objects.
     executor
         Whether work runs in local processes or on a Ray cluster.
+    store
+        The object store in which the run lies; None: it lies in its folder.
     item_limit_s
         How long a work item may take in a worker before it is said to hang [s].
     drawing
@@ -151,6 +102,7 @@ class StageContext:
     workers: int
     mesh_dir: Path | None
     executor: Executor = "local"
+    store: RunStore | None = None
     item_limit_s: float = math.inf
     drawing: Stopwatch = field(default_factory=Stopwatch)
     checking: Stopwatch = field(default_factory=Stopwatch)
@@ -165,6 +117,11 @@ class StageContext:
     def has_workers(self) -> bool:
         """Whether work items run in other processes than this one."""
         return self.executor != "local" or self.workers > 1
+
+    @property
+    def executor_alone(self) -> Executor:
+        """Where work runs whose files are none of the run's: with a store, on this machine."""
+        return self.executor if self.store is None else "local"
 
     @property
     def recording_id(self) -> str:

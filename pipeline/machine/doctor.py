@@ -24,6 +24,8 @@ seen = render_table(ScenesConfig(), static_cameras(StaticCameraConfig())[0])
 raise SystemExit(0 if (seen.depth_m > 0).any() else "the table is not in the picture")
 """
 CLUSTER = "stages.cluster"  # looks at each node, in a process of its own
+STORE = "stages.store"  # looks at the store of RUN, in a process of its own
+STORE_TIMEOUT_S = 150  # a request is tried again for store.patience_s, a minute
 CLUSTER_TIMEOUT_S = 300  # every node tries its renderer
 TRIAL_TIMEOUT_S = 120  # a first picture compiles shaders; a driver that hangs takes no longer
 
@@ -138,6 +140,23 @@ def check_cluster() -> Finding:
     return Finding("cluster", said, "give every node this project, these packages and this driver")
 
 
+def check_store() -> Finding:
+    """Check the object store that RUN_STORE, or RUN's run.toml, names, in a process of its own."""
+    command = [sys.executable, "-m", STORE, "look"]
+    run_toml = ROOT / "runs" / os.environ.get("RUN", "default") / "run.toml"
+    in_run = run_toml.is_file() and "[store]" in run_toml.read_text()
+    if not (os.environ.get("RUN_STORE") or in_run):
+        return Finding("store", "none: runs lie in their folders")
+    try:
+        looked = subprocess.run(
+            command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=STORE_TIMEOUT_S
+        )
+    except subprocess.TimeoutExpired:
+        return Finding("store", "does not answer", f"see '{' '.join(command)}'")
+    said = (looked.stdout.strip() or looked.stderr.strip()).removeprefix("store: ")
+    return Finding("store", said, "" if looked.returncode == 0 else "do as it says, then again")
+
+
 def check_room() -> Finding:
     """Check the number of cores and the free disk space."""
     free_gib = shutil.disk_usage(ROOT).free / 2**30
@@ -154,6 +173,7 @@ CHECKS: tuple[Callable[[], Finding], ...] = (
     check_driver,
     check_rendering,
     check_cluster,
+    check_store,
     check_room,
 )
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.errors import MachineError, SoftgripError
-from pipeline.execution.ray_executor import NODE_BACK_WITHIN_S, job_by_name, result_of
+from pipeline.execution.ray_executor import NODE_BACK_WITHIN_S, Sending, job_by_name, result_of
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -37,9 +37,9 @@ def test_a_job_travels_with_its_arguments(job: Callable[[str], str], made: str) 
 
 
 PROGRAM = """
-import pickle
 from dataclasses import dataclass
-from pipeline.execution.ray_executor import job_by_name, program_name, unpickled
+from pipeline.execution.ray_executor import job_by_name, program_name
+from pipeline.execution.stored_items import packed, unpacked
 
 @dataclass(frozen=True)
 class Item:
@@ -50,11 +50,11 @@ def job(item):
     return Item(item.number + 1)
 
 if __name__ == "__main__":
-    sent = pickle.dumps((job_by_name(job), Item(1)))
+    sent = packed((job_by_name(job), Item(1)), None)
     import program  # a second time, as a node does: its classes are others
-    named, item = unpickled(sent, {"__main__": program_name()})
+    named, item = unpacked(sent, {"__main__": program_name()})
     assert isinstance(item, program.Item) and not isinstance(item, Item)
-    result = unpickled(pickle.dumps(named(item)), {program_name(): "__main__"})
+    result = unpacked(packed(named(item), None), {program_name(): "__main__"})
     assert result == Item(2), result
     print("done")
 """
@@ -108,5 +108,5 @@ def test_where_no_node_comes_back_it_is_said_long_before_an_item_may_hang(
     monkeypatch.setattr(ray, "get", get)
     monkeypatch.setattr(ray, "nodes", lambda: looks[len(waited) - 1])
     with pytest.raises(SoftgripError, match=said):
-        result_of(None, "program", limit_s=5 * NODE_BACK_WITHIN_S)
+        result_of(None, Sending(), limit_s=5 * NODE_BACK_WITHIN_S)
     assert waited == [NODE_BACK_WITHIN_S] * waits

@@ -14,9 +14,8 @@ SECONDS = 8
 FORBIDDEN = ("torch.load", "torch.save", "eval", "exec")
 # A run's own processes hand each other pickles, as multiprocessing and Ray do; no file is read so.
 BETWEEN_OWN_PROCESSES = {
-    ROOT / "pipeline/execution/ray_executor.py",
+    ROOT / "pipeline/execution/stored_items.py",
     ROOT / "pipeline/execution/isolated.py",
-    ROOT / "pipeline/execution/rendering_nodes.py",
     ROOT / "pipeline/benchmarks/asked.py",
     ROOT / "pipeline/benchmarks/commits.py",
 }

@@ -97,3 +97,22 @@ def test_what_a_cluster_lacks_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path:
     finding = doctor.check_cluster()
     assert finding.state.splitlines() == ["1 of 2 nodes can", "  b: other files"]
     assert "this driver" in finding.remedy
+
+
+def test_the_store_is_looked_at_where_one_is_named(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(doctor, "ROOT", tmp_path)
+    monkeypatch.delenv("RUN_STORE", raising=False)
+    monkeypatch.setenv("RUN", "mine")
+    assert doctor.check_store() == doctor.Finding("store", "none: runs lie in their folders")
+    (tmp_path / "runs/mine").mkdir(parents=True)
+    (tmp_path / "runs/mine/run.toml").write_text('[store]\nurl = "s3://bucket/prefix"\n')
+    (tmp_path / "stages").mkdir()
+    (tmp_path / "stages/__init__.py").touch()
+    for text, remedy in (("print('store: fine')", ""), ("raise SystemExit('full')", "do as")):
+        (tmp_path / "stages/store.py").write_text(text)
+        finding = doctor.check_store()
+        assert finding.state == ("full" if remedy else "fine")
+        assert finding.remedy.startswith(remedy)
+        assert bool(finding.remedy) == bool(remedy)
