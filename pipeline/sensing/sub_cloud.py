@@ -10,8 +10,8 @@ Points more than ``grid_depth_m`` below the contact are left out: the pad cannot
 (H = 30 mm). Upwards the grid is as high as the way on which the label looks for obstacles.
 """
 
-import itertools
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -19,11 +19,20 @@ from jaxtyping import Bool, Float, Int
 
 from pipeline.config.grasps import SensingConfig
 from pipeline.geometry.transforms import invert
-from pipeline.world.cameras import PinholeCamera, pixel_slopes, project_local
+from pipeline.world.cameras import PinholeCamera, pixel_slopes
 
 _TILE = 8  # pixels a side: of tiles beside the box no pixel is looked at
 _BLOCK = 16  # clouds whose points are held at a time: they stay in the cache
 _ROUNDING_M = 1e-9  # far more than rounding moves a point, far less than a cell
+
+
+class _Row(NamedTuple):
+    """Points of neighbouring pixels of a row, in a contact's axes, and their cells."""
+
+    x: Float[np.ndarray, " w"]
+    y: Float[np.ndarray, " w"]
+    z: Float[np.ndarray, " w"]
+    cell: Int[np.ndarray, " w"]
 
 
 def sub_clouds(
@@ -88,21 +97,24 @@ def merged_sub_clouds(
         windows = _windows(depth.shape, camera.intrinsics, pose, box)
         slopes = pixel_slopes(camera.intrinsics, depth.shape)
         most = _most_pixels(windows)
-        room = (np.empty((most, 3)), np.empty(most, dtype=np.int32))
+        room = (np.empty((most + 1, 4)), np.empty(most + 1, dtype=np.int32))
         seen_by.append(((depth, *_tile_depths(depth, windows), *slopes), pose, windows, room))
-    tops = np.full((count, cells, cells), -np.inf)
-    sums = np.zeros((count, cells, cells, 4))
+    # A cell more than there are takes what lies in none.
+    tops = np.empty((_BLOCK, cells * cells + 1))
+    sums = np.empty((_BLOCK, cells * cells, 4))
+    cloud = np.empty((count, cells, cells, 3), dtype=np.float32)
+    seen = np.empty((count, cells, cells), dtype=np.bool_)
     for start in range(0, count, _BLOCK):
         rows = slice(start, start + _BLOCK)
+        tops.fill(-np.inf)
+        sums.fill(0.0)
         ends = [
-            _collect(*picture, pose[rows], windows[rows], box, tops[rows], *room)
+            _collect(*picture, pose[rows], windows[rows], box, cells, tops, *room)
             for picture, pose, windows, room in seen_by
         ]
         for (*_, room), end in zip(seen_by, ends, strict=True):
-            _add(*room, end, config.layer_m, tops[rows], sums[rows])
-    cloud = np.zeros((count, cells, cells, 3), dtype=np.float32)
-    seen = np.zeros((count, cells, cells), dtype=np.bool_)
-    _means(sums, radius_m, cloud, seen)
+            _add(*room, end, config.layer_m, tops, sums)
+        _means(sums, radius_m, cloud[rows], seen[rows])
     return cloud, seen
 
 
@@ -149,8 +161,9 @@ def _collect(
     camera_from_contact: Float[np.ndarray, "b 4 4"],
     windows: Int[np.ndarray, "b 4"],
     box: tuple[float, float, float],
-    tops: Float[np.ndarray, "b g g"],
-    points: Float[np.ndarray, "most 3"],
+    cells: int,
+    tops: Float[np.ndarray, "block g2"],
+    points: Float[np.ndarray, "most 4"],
     cell_of: Int[np.ndarray, " most"],
 ) -> Int[np.ndarray, " ends"]:
     """Find the points of one depth image in each box, row by row of its pixels, and their cells.
@@ -158,108 +171,124 @@ def _collect(
     Raises each cell's top to its highest point. Returns where each box's points begin, and where
     the last one's end.
     """
-    cells = tops.shape[1]
     count = len(camera_from_contact)
     scale = cells / (2.0 * box[0])
     first = np.zeros(count + 1, dtype=np.int64)
     inside = np.zeros(least.shape[1], dtype=np.bool_)
+    lows, highs = np.empty((3, least.shape[1])), np.empty((3, least.shape[1]))
+    begins = np.empty(least.shape[1], dtype=np.int64)
+    ends = np.empty(least.shape[1], dtype=np.int64)
+    width = depth.shape[1]
+    here = _Row(np.empty(width), np.empty(width), np.empty(width), np.empty(width, np.int32))
     at = 0
     for b in range(count):
         pose = camera_from_contact[b]
-        highest = tops[b].reshape(cells * cells)
+        highest = tops[b]
         left, right, top, bottom = windows[b]
         origin = _origin(pose)
+        first_tile, last_tile = left // _TILE, right // _TILE
+        for tile in range(first_tile, last_tile + 1):
+            x_0, x_1 = x[max(left, tile * _TILE)], x[min(right, tile * _TILE + _TILE - 1)]
+            for axis in range(3):
+                u = pose[0, axis]
+                lows[axis, tile], highs[axis, tile] = min(u * x_0, u * x_1), max(u * x_0, u * x_1)
         for tile_row in range(top // _TILE, bottom // _TILE + 1):
             rows = (max(top, tile_row * _TILE), min(bottom, tile_row * _TILE + _TILE - 1))
-            for tile in range(left // _TILE, right // _TILE + 1):
-                columns = (max(left, tile * _TILE), min(right, tile * _TILE + _TILE - 1))
-                near, far = least[tile_row, tile], greatest[tile_row, tile]
-                inside[tile] = near <= far and _may_meet(
-                    near,
-                    far,
-                    x[columns[0]],
-                    x[columns[1]],
-                    y[rows[0]],
-                    y[rows[1]],
-                    pose,
-                    origin,
-                    box,
-                )
+            tiles = slice(first_tile, last_tile + 1)
+            _may_meet(
+                least[tile_row, tiles],
+                greatest[tile_row, tiles],
+                lows,
+                highs,
+                first_tile,
+                y[rows[0]],
+                y[rows[1]],
+                pose,
+                origin,
+                box,
+                inside[tiles],
+            )
+            runs = _runs(inside, left, right, begins, ends)
             for row in range(rows[0], rows[1] + 1):
                 down = _of_row(y[row], pose)
-                for tile in range(left // _TILE, right // _TILE + 1):
-                    if not inside[tile]:
-                        continue
-                    for column in range(
-                        max(left, tile * _TILE), min(right, tile * _TILE + _TILE - 1) + 1
-                    ):
-                        z = depth[row, column]
-                        if z > 0.0:
-                            point = _placed(z, x[column], pose, down, origin)
-                            cell = _cell(point, box, scale, cells)
-                            if cell < 0:
-                                continue
-                            if point[2] > highest[cell]:
-                                highest[cell] = point[2]
-                            points[at, 0], points[at, 1], points[at, 2] = point
-                            cell_of[at] = cell
-                            at += 1
+                for run in range(runs):
+                    columns = slice(begins[run], ends[run])
+                    _place(
+                        depth[row, columns], x[columns], pose, down, origin, box, scale, cells, here
+                    )
+                    # Every pixel is written, and the next over it where it lies in no cell:
+                    # branches that none can foresee cost more.
+                    for i in range(ends[run] - begins[run]):
+                        cell = here.cell[i]
+                        highest[cell] = max(highest[cell], here.z[i])
+                        points[at, 0] = here.x[i]
+                        points[at, 1] = here.y[i]
+                        points[at, 2] = here.z[i]
+                        points[at, 3] = 1.0
+                        cell_of[at] = cell
+                        at += cell < cells * cells
         first[b + 1] = at
     return first
 
 
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]
 def _may_meet(
-    near: float,
-    far: float,
-    x_0: float,
-    x_1: float,
+    near: Float[np.ndarray, " tiles"],
+    far: Float[np.ndarray, " tiles"],
+    lows: Float[np.ndarray, "3 tw"],
+    highs: Float[np.ndarray, "3 tw"],
+    first: int,
     y_0: float,
     y_1: float,
     pose: Float[np.ndarray, "4 4"],
     origin: tuple[float, float, float],
     box: tuple[float, float, float],
-) -> bool:
-    """Whether any point of pixels between these slopes and depths may lie in the box.
+    inside: Bool[np.ndarray, " tiles"],
+) -> None:
+    """Whether any point of each tile of a row, between two slopes y, may lie in the box.
 
-    Each axis by itself: a point is z (u, v, 1) turned, linear in u and v for each z.
+    Each axis by itself: a point is z (u, v, 1) turned, linear in u and v for each z. `lows` and
+    `highs` are the least and greatest of the term in u.
     """
     half, depth, height = box
-    lows, highs = (-half, -half, -depth), (half, half, height)
+    for tile in range(len(inside)):
+        inside[tile] = near[tile] <= far[tile]
     for axis in range(3):
-        u, v, w = pose[0, axis], pose[1, axis], pose[2, axis]
-        low = min(u * x_0, u * x_1) + min(v * y_0, v * y_1) + w
-        high = max(u * x_0, u * x_1) + max(v * y_0, v * y_1) + w
-        if max(high * near, high * far) - origin[axis] < lows[axis] - _ROUNDING_M:
-            return False
-        if min(low * near, low * far) - origin[axis] > highs[axis] + _ROUNDING_M:
-            return False
-    return True
+        least = (-depth if axis == 2 else -half) - _ROUNDING_M + origin[axis]
+        greatest = (height if axis == 2 else half) + _ROUNDING_M + origin[axis]
+        v, w = pose[1, axis], pose[2, axis]
+        low, high = min(v * y_0, v * y_1) + w, max(v * y_0, v * y_1) + w
+        of_axis, to_axis = lows[axis, first:], highs[axis, first:]
+        for tile in range(len(inside)):
+            from_ = of_axis[tile] + low
+            to = to_axis[tile] + high
+            reaches = max(to * near[tile], to * far[tile]) >= least
+            begins = min(from_ * near[tile], from_ * far[tile]) <= greatest
+            inside[tile] = inside[tile] & reaches & begins
 
 
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]
 def _add(
-    points: Float[np.ndarray, "most 3"],
+    points: Float[np.ndarray, "most 4"],
     cell_of: Int[np.ndarray, " most"],
     first: Int[np.ndarray, " ends"],
     layer: float,
-    tops: Float[np.ndarray, "b g g"],
-    sums: Float[np.ndarray, "b g g 4"],
+    tops: Float[np.ndarray, "block g2"],
+    sums: Float[np.ndarray, "block g2 4"],
 ) -> None:
     """Add the points near the top of their cell, and their number, to the cell's sums."""
-    cells = sums.shape[1]
-    for b in range(len(sums)):
-        highest = tops[b].reshape(cells * cells)
-        of_cell = sums[b].reshape(cells * cells, 4)
+    for b in range(len(first) - 1):
+        highest = tops[b]
+        of_cell = sums[b]
         for at in range(first[b], first[b + 1]):
             cell = cell_of[at]
-            if points[at, 2] >= highest[cell] - layer:
-                of_cell[cell, 0] += points[at, 0]
-                of_cell[cell, 1] += points[at, 1]
-                of_cell[cell, 2] += points[at, 2]
-                of_cell[cell, 3] += 1.0
+            # A point too low is added as zeros: a branch that none can foresee costs more.
+            near = 1.0 if points[at, 2] >= highest[cell] - layer else 0.0
+            for c in range(4):
+                of_cell[cell, c] += near * points[at, c]
 
 
+@numba.njit(cache=True)  # type: ignore[untyped-decorator]
 def _windows(
     shape: tuple[int, int],
     intrinsics: Float[np.ndarray, "3 3"],
@@ -268,18 +297,27 @@ def _windows(
 ) -> Int[np.ndarray, "b 4"]:
     """First and last column, first and last row that each box's eight corners project between."""
     half, depth, height = box
-    corners = np.array(list(itertools.product((-half, half), (-half, half), (-depth, height))))
-    pixels = project_local(
-        intrinsics,
-        corners @ camera_from_contact[:, :3, :3].transpose(0, 2, 1)
-        + camera_from_contact[:, None, :3, 3],
-    )
-    first, last = np.floor(pixels.min(axis=1)), np.floor(pixels.max(axis=1))
-    behind = np.isnan(first)  # a corner behind the camera: anywhere in the picture
-    size = np.array([shape[1], shape[0]])
-    first = np.where(behind, 0.0, np.clip(first, 0, size))
-    last = np.where(behind, size - 1.0, np.clip(last, -1, size - 1))
-    return np.stack([first[:, 0], last[:, 0], first[:, 1], last[:, 1]], axis=1).astype(np.int64)
+    windows = np.empty((len(camera_from_contact), 4), dtype=np.int64)
+    for b in range(len(camera_from_contact)):
+        pose = camera_from_contact[b]
+        for axis in range(2):
+            focal, middle, size = intrinsics[axis, axis], intrinsics[axis, 2], shape[1 - axis]
+            least, greatest = np.inf, -np.inf
+            behind = False
+            for x in (-half, half):
+                for y in (-half, half):
+                    for z in (-depth, height):
+                        away = pose[2, 0] * x + pose[2, 1] * y + pose[2, 2] * z + pose[2, 3]
+                        aside = pose[axis, 0] * x + pose[axis, 1] * y + pose[axis, 2] * z
+                        behind |= away <= 0.0
+                        if away > 0.0:
+                            pixel = focal * (aside + pose[axis, 3]) / away + middle
+                            least, greatest = min(least, pixel), max(greatest, pixel)
+            if behind:  # a corner behind the camera: anywhere in the picture
+                least, greatest = 0.0, size - 1.0
+            windows[b, 2 * axis] = int(np.floor(min(max(least, 0.0), float(size))))
+            windows[b, 2 * axis + 1] = int(np.floor(min(max(greatest, -1.0), size - 1.0)))
+    return windows
 
 
 # A pixel's point in CCS is z (u, v, 1), with u the slope of its column and v of its row. In the
@@ -308,47 +346,78 @@ def _of_row(v: float, pose: Float[np.ndarray, "4 4"]) -> tuple[float, float, flo
 
 
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]
-def _placed(
-    z: float,
-    u: float,
+def _place(
+    depth: Float[np.ndarray, " k"],
+    u: Float[np.ndarray, " k"],
     pose: Float[np.ndarray, "4 4"],
     down: tuple[float, float, float],
     origin: tuple[float, float, float],
-) -> tuple[float, float, float]:
-    """A pixel's point from the contact, in the contact's axes."""
-    return (
-        z * (pose[0, 0] * u + down[0]) - origin[0],
-        z * (pose[0, 1] * u + down[1]) - origin[1],
-        z * (pose[0, 2] * u + down[2]) - origin[2],
-    )
+    box: tuple[float, float, float],
+    scale: float,
+    cells: int,
+    here: _Row,
+) -> None:
+    """Points of neighbouring pixels from the contact, in its axes, and their cells.
+
+    The cell of a point in none is one more than there are. Without a branch, so that the loop runs
+    in SIMD lanes.
+    """
+    half, reach, height = box
+    a_0, a_1, a_2 = pose[0, 0], pose[0, 1], pose[0, 2]
+    d_0, d_1, d_2 = down
+    o_0, o_1, o_2 = origin
+    last, none = np.int32(cells - 1), np.int32(cells * cells)
+    x_of, y_of, z_of, cell_of = here.x, here.y, here.z, here.cell
+    for i in range(len(depth)):
+        far = depth[i]
+        x = far * (a_0 * u[i] + d_0) - o_0
+        y = far * (a_1 * u[i] + d_1) - o_1
+        z = far * (a_2 * u[i] + d_2) - o_2
+        x_of[i] = x
+        y_of[i] = y
+        z_of[i] = z
+        within = (far > 0.0) & (z >= -reach) & (z <= height) & (abs(x) < half) & (abs(y) < half)
+        # Rounding may carry a point just inside the border over it.
+        row = min(np.int32((y + half) * scale), last)
+        column = min(np.int32((x + half) * scale), last)
+        cell_of[i] = np.int32(row * np.int32(cells) + column) if within else none
 
 
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]
-def _cell(
-    point: tuple[float, float, float], box: tuple[float, float, float], scale: float, cells: int
+def _runs(
+    inside: Bool[np.ndarray, " tw"],
+    left: int,
+    right: int,
+    begins: Int[np.ndarray, " tw"],
+    ends: Int[np.ndarray, " tw"],
 ) -> int:
-    """Index of the cell a point lies in, row by row; -1 outside the box."""
-    half, depth, height = box
-    x, y, z = point
-    if z < -depth or z > height or abs(x) >= half or abs(y) >= half:
-        return -1
-    # Rounding may carry a point just inside the border over it.
-    row = min(int((y + half) * scale), cells - 1)
-    return row * cells + min(int((x + half) * scale), cells - 1)
+    """Columns from left to right that lie in tiles inside, as runs of neighbours; how many runs."""
+    count = 0
+    for tile in range(left // _TILE, right // _TILE + 1):
+        if not inside[tile]:
+            continue
+        begin, end = max(left, tile * _TILE), min(right, tile * _TILE + _TILE - 1) + 1
+        if count > 0 and ends[count - 1] == begin:
+            ends[count - 1] = end
+        else:
+            begins[count], ends[count] = begin, end
+            count += 1
+    return count
 
 
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]
 def _means(
-    sums: Float[np.ndarray, "b g g 4"],
+    sums: Float[np.ndarray, "block g2 4"],
     radius: float,
     cloud: Float[np.ndarray, "b g g 3"],
     seen: Bool[np.ndarray, "b g g"],
 ) -> None:
-    count, cells = sums.shape[:2]
+    count, cells = seen.shape[:2]
     for b in range(count):
         for i in range(cells):
             for j in range(cells):
-                if sums[b, i, j, 3] > 0.0:
-                    seen[b, i, j] = True
-                    for axis in range(3):
-                        cloud[b, i, j, axis] = sums[b, i, j, axis] / sums[b, i, j, 3] / radius
+                of_cell = sums[b, i * cells + j]
+                seen[b, i, j] = of_cell[3] > 0.0
+                for axis in range(3):
+                    mean = of_cell[axis] / of_cell[3] / radius if seen[b, i, j] else 0.0
+                    cloud[b, i, j, axis] = mean

@@ -1,4 +1,4 @@
-"""The quality QP by an interior-point method that factors five rows.
+"""The quality QP in five numbers: the solver that labels are made with.
 
 Everything in Eq. (8)-(14) but the bounds on W depends on W through five numbers: GW and
 the sum. With v = (W - 1) / sigma_W, so that sum v = 0 and -1 <= v <= 1, and t = GW / F_v:
@@ -7,54 +7,29 @@ the sum. With v = (W - 1) / sigma_W, so that sum v = 0 and -1 <= v <= 1, and t =
     over v, t  with  t = t0 + M v,  1'v = 0,  -1 <= v <= 1,  a <= t <= b,
 
 where t0 = G 1 / F_v, M = sigma_W (G - row means) / F_v (taking the means off changes
-nothing, as v sums to 0) and a, b are the bounds of Eq. (8)-(11) over F_v. With multipliers
-pi (t = t0 + M v), nu (sum), z_l, z_u (bounds on v), w_l, w_u (bounds on t), optimality reads
-
-    M'pi + nu 1 - z_l + z_u = 0,      k (k t - s Lambda) - pi - w_l + w_u = 0,
-
-and complementarity of each multiplier with its slack. Newton's step on it eliminates the
-multipliers of the bounds: with the diagonals D = z_l/(1+v) + z_u/(1-v) and
-E = k^2 + w_l/(t-a) + w_u/(b-t),
-
-    M'dpi + 1 dnu + D dv = rho,       E dt - dpi = theta,
-    M dv - dt = r_p,                  1'dv = r_s,
-
-so dv = (rho - M'dpi - 1 dnu)/D and dt = (theta + dpi)/E leave a symmetric positive
-definite 5 x 5 system for (dpi, dnu):
-
-    [ M D^-1 M' + E^-1    M D^-1 1 ]         [ M D^-1 rho - theta/E - r_p ]
-    [ 1'D^-1 M'           1'D^-1 1 ] (...) = [ 1'D^-1 rho - r_s           ].
-
-Forming it is one pass over the triangles. The step is Mehrotra's predictor and corrector.
+nothing, as v sums to 0) and a, b are the bounds of Eq. (8)-(11) over F_v.
 
 Infeasibility is certified, not guessed. For every pi and nu (Farkas' lemma), if
 
     pi't0 - sum_j |(M'pi + nu 1)_j|  >  max over a <= t <= b of pi't,
 
 no v within its bounds meets the limits; the left side is a lower bound of pi't over them.
-When the limits cannot be met the multipliers grow along such a certificate, so it is
-tried with the multipliers of every iteration, and with the four axes before the first.
-The same sums show which limits can never bind: those are dropped, which also leaves an
-interior to problems whose F_z cannot vary at all.
+The same sums, with pi along an axis, show which limits can never bind: those are dropped,
+which also leaves an interior to problems whose F_z cannot vary at all.
+
+`sifting` decides a problem or leaves few of its triangles open; `interior_point` solves for the
+few, and `certificate` says whether that is optimal for all. What is not decided so,
+`interior_point` solves with all triangles. Each module is compiled by itself, so that numba's disk
+cache notices a change of any.
 """
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from pipeline.gripper.compiled import compiled_finite
 from pipeline.gripper.problem import GraspStatus, QpSolution, QualityProblem
-
-SOLVED = int(GraspStatus.SOLVED)
-INFEASIBLE = int(GraspStatus.INFEASIBLE)
-MAX_ITERATIONS = int(GraspStatus.MAX_ITERATIONS)
-
-# Limits count as met, or as certainly broken, to this much of F_v.
-FEASIBILITY_TOLERANCE = 1e-9
-# |s(GW - Lambda)| is wanted to this accuracy: q then has it too, as |dq| <= q |dr|.
-RESIDUAL_TOLERANCE = 2e-8
-# Below this |s(GW - Lambda)| the gap is held to an absolute bound: r within 2e-7.
-CORNER = 1e-6
-_WORK_ARRAYS = 12
+from pipeline.gripper.solvers import interior_point
+from pipeline.gripper.solvers.certificate import certify_into
+from pipeline.gripper.solvers.sifting import ROOM, SIFTED, UNDECIDED, sift_into
 
 
 def solve(problem: QualityProblem) -> QpSolution:
@@ -83,7 +58,6 @@ def solve(problem: QualityProblem) -> QpSolution:
     return QpSolution(weights[0], GraspStatus(int(status[0])), int(iterations[0]))
 
 
-@compiled_finite
 def solve_into(
     wrench_matrices: Float[np.ndarray, "batch 4 most"],
     counts: Int[np.ndarray, " batch"],
@@ -98,517 +72,113 @@ def solve_into(
     status: Int[np.ndarray, " batch"],
     iterations: Int[np.ndarray, " batch"],
 ) -> None:
-    """Solve many problems one after another in the same workspace.
+    """Solve many problems.
 
-    Problem i is made of the first counts[i] columns; its bounds on GW are forces[i]
-    times `lower` and `upper`. A problem with forces[i] = 0 has G = 0 and W = 1.
+    Parameters
+    ----------
+    wrench_matrices
+        G, shape (batch, 4, most); problem i is made of the first counts[i] columns.
+    counts
+        Triangles of each, shape (batch,).
+    forces
+        F_v in units of G, shape (batch,). A problem with forces[i] = 0 has G = 0 and W = 1.
+    lower
+        Least GW over F_v by Eq. (8)-(11), shape (4,).
+    upper
+        Greatest GW over F_v, shape (4,).
+    target
+        Lambda, shape (4,).
+    scale
+        s [1].
+    spread
+        sigma_W [1].
+    max_iterations
+        Most iterations of a problem: passes of sifting and of the interior-point method.
+    weights
+        W of each is written here, 1 where it is INFEASIBLE; shape (batch, most).
+    status
+        Values of `GraspStatus` are written here, shape (batch,).
+    iterations
+        How many were made is written here, shape (batch,).
     """
-    most = wrench_matrices.shape[2]
-    rows = np.empty((4, most))
-    work = np.empty((_WORK_ARRAYS, most))
-    for i in range(counts.size):
-        n = counts[i]
-        for j in range(n):
-            weights[i, j] = 1.0
-        status[i] = SOLVED
-        iterations[i] = 0
-        if n == 0 or forces[i] <= 0.0:
-            continue
-        status[i], iterations[i] = _interior_point(
-            wrench_matrices[i],
-            n,
-            forces[i],
-            lower,
-            upper,
-            target,
-            scale,
-            spread,
+    batch = len(counts)
+    rows = np.empty((batch, 4, ROOM))
+    columns = np.empty((batch, ROOM), dtype=np.int64)
+    left = np.zeros(batch, dtype=np.int64)
+    centres, sums = np.empty((batch, 4)), np.empty(batch)
+    bounded = np.empty((batch, 4), dtype=np.bool_)
+    found, multipliers = np.empty((batch, ROOM)), np.empty((batch, 5))
+    verdict, steps = np.zeros(batch, dtype=np.int64), np.zeros(batch, dtype=np.int64)
+    setting = (lower, upper, target, scale)
+    sift_into(
+        wrench_matrices,
+        counts,
+        forces,
+        *setting,
+        spread,
+        max_iterations,
+        weights,
+        status,
+        iterations,
+        rows,
+        columns,
+        left,
+        centres,
+        sums,
+        bounded,
+    )
+    interior_point.solve_into(
+        rows,
+        left,
+        centres,
+        sums,
+        bounded,
+        forces,
+        *setting,
+        max_iterations,
+        status == SIFTED,
+        found,
+        multipliers,
+        verdict,
+        steps,
+    )
+    certify_into(
+        wrench_matrices,
+        counts,
+        forces,
+        target,
+        scale,
+        spread,
+        max_iterations,
+        columns,
+        left,
+        found,
+        multipliers,
+        verdict,
+        steps,
+        weights,
+        status,
+        iterations,
+    )
+    for i in np.flatnonzero(status == UNDECIDED).tolist():
+        of_all = wrench_matrices[i : i + 1, :, : counts[i]] / forces[i]
+        one = slice(i, i + 1)
+        v, zero = np.empty((1, counts[i])), np.zeros(1)
+        interior_point.solve_into(
+            spread * (of_all - of_all.mean(axis=2, keepdims=True)),
+            counts[one],
+            of_all.sum(axis=2),
+            zero,
+            bounded[one],
+            forces[one],
+            *setting,
             max_iterations,
-            rows,
-            work,
+            np.ones(1, dtype=np.bool_),
+            v,
+            multipliers[one],
+            status[one],
+            iterations[one],
         )
-        if status[i] != INFEASIBLE:
-            for j in range(n):
-                weights[i, j] = 1.0 + spread * work[0, j]
-
-
-@compiled_finite
-def _interior_point(
-    wrench_matrix: Float[np.ndarray, "4 most"],
-    n: int,
-    force: float,
-    lower: Float[np.ndarray, " 4"],
-    upper: Float[np.ndarray, " 4"],
-    target: Float[np.ndarray, " 4"],
-    scale: float,
-    spread: float,
-    max_iterations: int,
-    rows: Float[np.ndarray, "4 most"],
-    work: Float[np.ndarray, "work most"],
-) -> tuple[int, int]:
-    """Status and iterations; v is left in work[0]."""
-    # Slices of exactly n elements let the loops below run without bounds on strides.
-    v, z_l, z_u = work[0, :n], work[1, :n], work[2, :n]
-    h, d_inv, rho, dv = work[3, :n], work[4, :n], work[5, :n], work[6, :n]
-    p_l, p_u, i_l, i_u = work[7, :n], work[8, :n], work[9, :n], work[10, :n]
-    most = work[11, :n]
-    m_0, m_1, m_2, m_3 = rows[0, :n], rows[1, :n], rows[2, :n], rows[3, :n]
-    t0 = np.empty(4)
-    bounded = np.empty(4, dtype=np.bool_)
-    for r in range(4):
-        verdict = _centre_row(wrench_matrix[r, :n], rows[r, :n], force, spread, lower[r], upper[r])
-        t0[r] = verdict[0]
-        bounded[r] = verdict[1] > 0.0
-        if verdict[1] < 0.0:
-            return INFEASIBLE, 0
-
-    k = scale * force
-    t = np.empty(4)
-    pi = np.empty(4)
-    w_l = np.zeros(4)
-    w_u = np.zeros(4)
-    nu = 0.0
-    for r in range(4):
-        t[r] = t0[r]
-        if bounded[r]:
-            margin = 0.05 * (upper[r] - lower[r])
-            t[r] = min(max(t0[r], lower[r] + margin), upper[r] - margin)
-        pi[r] = k * (k * t[r] - scale * target[r])
-    total = 0.0
-    for j in range(n):
-        h[j] = pi[0] * m_0[j] + pi[1] * m_1[j] + pi[2] * m_2[j] + pi[3] * m_3[j]
-        total += abs(h[j])
-    shift = max(total / n, 1e-4 / n)
-    for j in range(n):
-        v[j] = 0.0
-        z_l[j] = max(h[j], 0.0) + shift
-        z_u[j] = max(-h[j], 0.0) + shift
-        # The first move is of length 0.
-        dv[j] = p_l[j] = p_u[j] = i_l[j] = i_u[j] = 0.0
-    for r in range(4):
-        if bounded[r]:
-            w_l[r] = 0.05
-            w_u[r] = 0.05
-
-    system = np.empty((5, 5))
-    right = np.empty(5)
-    step = np.empty(5)
-    dt = np.empty(4)
-    e_inv = np.empty(4)
-    theta = np.empty(4)
-    c_l = np.zeros(4)
-    c_u = np.zeros(4)
-    alpha = 0.0
-    for iteration in range(max_iterations + 1):
-        # Move; residuals and the duality gap at this point.
-        gap, dual, reach, s_v, p_0, p_1, p_2, p_3 = _move(
-            m_0, m_1, m_2, m_3, pi, nu, alpha, dv, p_l, p_u, v, z_l, z_u, i_l, i_u, h
-        )
-        r_p = (t[0] - t0[0] - p_0, t[1] - t0[1] - p_1, t[2] - t0[2] - p_2, t[3] - t0[3] - p_3)
-        products = 2.0 * n
-        residual = 0.0
-        primal = 0.0
-        farkas = -reach
-        size = 0.0
-        for r in range(4):
-            if bounded[r]:
-                gap += w_l[r] * (t[r] - lower[r]) + w_u[r] * (upper[r] - t[r])
-                products += 2.0
-            y = k * t[r] - scale * target[r]
-            dual += abs(k * y - pi[r] - w_l[r] + w_u[r])
-            residual += y * y
-            primal = max(primal, abs(r_p[r]))
-            farkas += pi[r] * t0[r] - max(pi[r] * lower[r], pi[r] * upper[r])
-            size += abs(pi[r])
-        if farkas > FEASIBILITY_TOLERANCE * size:
-            return INFEASIBLE, iteration
-        residual = np.sqrt(residual)
-        feasible = primal <= 0.1 * FEASIBILITY_TOLERANCE and k * primal <= 0.1 * RESIDUAL_TOLERANCE
-        # 1/2 r^2 lies within the gap of its optimum, hence r within gap / r. At a perfect
-        # seal r itself is the bound on its distance from 0.
-        closed = gap + 2.0 * dual <= RESIDUAL_TOLERANCE * max(residual, CORNER)
-        if feasible and (closed or residual <= RESIDUAL_TOLERANCE):
-            return SOLVED, iteration
-        if iteration == max_iterations:
-            return MAX_ITERATIONS, iteration
-        mu = gap / products
-
-        # The 5 x 5 system, and the predictor's right side.
-        _form(m_0, m_1, m_2, m_3, z_l, z_u, i_l, i_u, h, d_inv, system, right)
-        for r in range(4):
-            e = k * k
-            if bounded[r]:
-                e += w_l[r] / (t[r] - lower[r]) + w_u[r] / (upper[r] - t[r])
-            e_inv[r] = 1.0 / e
-            system[r, r] += e_inv[r]
-        _factor(system)
-        sigma_mu = 0.0
-        for r in range(4):
-            c_l[r] = 0.0
-            c_u[r] = 0.0
-        worst = 0.0
-        for corrector in range(2):
-            if corrector == 1:
-                _correct(
-                    m_0,
-                    m_1,
-                    m_2,
-                    m_3,
-                    z_l,
-                    z_u,
-                    i_l,
-                    i_u,
-                    h,
-                    d_inv,
-                    dv,
-                    sigma_mu,
-                    p_l,
-                    p_u,
-                    rho,
-                    right,
-                )
-            for r in range(4):
-                theta[r] = pi[r] - k * (k * t[r] - scale * target[r])
-                if bounded[r]:
-                    theta[r] += (sigma_mu - c_l[r]) / (t[r] - lower[r])
-                    theta[r] -= (sigma_mu - c_u[r]) / (upper[r] - t[r])
-                right[r] -= theta[r] * e_inv[r] + r_p[r]
-            right[4] += s_v
-            _substitute(system, right, step)
-            ahead = 0.0
-            if corrector == 0:
-                worst, ahead = _predict(
-                    m_0, m_1, m_2, m_3, z_l, z_u, i_l, i_u, h, d_inv, step, dv, most
-                )
-            else:
-                worst = _step(
-                    m_0, m_1, m_2, m_3, z_l, z_u, i_l, i_u, p_l, p_u, rho, d_inv, step, dv, most
-                )
-            for r in range(4):
-                dt[r] = (theta[r] + step[r]) * e_inv[r]
-                if bounded[r]:
-                    s_l = t[r] - lower[r]
-                    s_u = upper[r] - t[r]
-                    dw_l = (sigma_mu - c_l[r] - w_l[r] * dt[r]) / s_l - w_l[r]
-                    dw_u = (sigma_mu - c_u[r] + w_u[r] * dt[r]) / s_u - w_u[r]
-                    worst = max(worst, -dt[r] / s_l, dt[r] / s_u)
-                    worst = max(worst, -dw_l / w_l[r], -dw_u / w_u[r])
-                    if corrector == 0:
-                        c_l[r] = dt[r] * dw_l
-                        c_u[r] = -dt[r] * dw_u
-                        ahead += c_l[r] + c_u[r]
-            if corrector == 0:
-                # Each product of slack and multiplier goes from s z to (1 - a) s z + a^2 ds dz.
-                alpha = 1.0 / max(worst, 1.0)
-                ratio = max((1.0 - alpha) * gap + alpha * alpha * ahead, 0.0) / gap
-                sigma_mu = mu * ratio * ratio * ratio
-            else:
-                alpha = min(1.0, 0.995 / max(worst, 1e-300))
-
-        # Move what is not of a triangle.
-        nu += alpha * step[4]
-        for r in range(4):
-            if bounded[r]:
-                s_l = t[r] - lower[r]
-                s_u = upper[r] - t[r]
-                w_l[r] += alpha * ((sigma_mu - c_l[r] - w_l[r] * dt[r]) / s_l - w_l[r])
-                w_u[r] += alpha * ((sigma_mu - c_u[r] + w_u[r] * dt[r]) / s_u - w_u[r])
-            t[r] += alpha * dt[r]
-            pi[r] += alpha * step[r]
-    return MAX_ITERATIONS, max_iterations
-
-
-@compiled_finite
-def _centre_row(
-    row: Float[np.ndarray, " n"],
-    centred: Float[np.ndarray, " n"],
-    force: float,
-    spread: float,
-    lower: float,
-    upper: float,
-) -> tuple[float, float]:
-    """Row of M, its t0, and a verdict on its limits: 1 may bind, 0 never, -1 never met.
-
-    |row of M v| is at most the sum of |M_j|: Farkas' condition with pi along one axis.
-    """
-    total = 0.0
-    for j in range(row.size):
-        total += row[j]
-    mean = total / row.size
-    reach = 0.0
-    for j in range(row.size):
-        centred[j] = (row[j] - mean) * (spread / force)
-        reach += abs(centred[j])
-    middle = total / force
-    if middle - reach > upper + FEASIBILITY_TOLERANCE:
-        return middle, -1.0
-    if middle + reach < lower - FEASIBILITY_TOLERANCE:
-        return middle, -1.0
-    slack = 0.1 * FEASIBILITY_TOLERANCE
-    if middle + reach <= upper + slack and middle - reach >= lower - slack:
-        return middle, 0.0
-    return middle, 1.0
-
-
-@compiled_finite
-def _move(
-    m_0: Float[np.ndarray, " n"],
-    m_1: Float[np.ndarray, " n"],
-    m_2: Float[np.ndarray, " n"],
-    m_3: Float[np.ndarray, " n"],
-    pi: Float[np.ndarray, " 4"],
-    nu: float,
-    alpha: float,
-    dv: Float[np.ndarray, " n"],
-    p_l: Float[np.ndarray, " n"],
-    p_u: Float[np.ndarray, " n"],
-    v: Float[np.ndarray, " n"],
-    z_l: Float[np.ndarray, " n"],
-    z_u: Float[np.ndarray, " n"],
-    i_l: Float[np.ndarray, " n"],
-    i_u: Float[np.ndarray, " n"],
-    h: Float[np.ndarray, " n"],
-) -> tuple[float, float, float, float, float, float, float, float]:
-    """A step of length alpha; then h = M'pi + nu 1 and the inverses of the slacks there.
-
-    Returns the sum of z times slack, the sum of |h - z_l + z_u|, that of |h|, 1'v and M v.
-    """
-    e_0, e_1, e_2, e_3 = pi[0], pi[1], pi[2], pi[3]
-    gap = dual = reach = s_v = p_0 = p_1 = p_2 = p_3 = 0.0
-    for j in range(v.size):
-        z_lj = z_l[j] + alpha * (p_l[j] - z_l[j] - z_l[j] * dv[j] * i_l[j])
-        z_uj = z_u[j] + alpha * (p_u[j] - z_u[j] + z_u[j] * dv[j] * i_u[j])
-        vj = v[j] + alpha * dv[j]
-        hj = e_0 * m_0[j] + e_1 * m_1[j] + e_2 * m_2[j] + e_3 * m_3[j] + nu
-        a_l = 1.0 + vj
-        a_u = 1.0 - vj
-        inverse = 1.0 / (a_l * a_u)
-        z_l[j] = z_lj
-        z_u[j] = z_uj
-        v[j] = vj
-        h[j] = hj
-        i_l[j] = a_u * inverse
-        i_u[j] = a_l * inverse
-        gap += z_lj * a_l + z_uj * a_u
-        dual += abs(hj - z_lj + z_uj)
-        reach += abs(hj)
-        s_v += vj
-        p_0 += m_0[j] * vj
-        p_1 += m_1[j] * vj
-        p_2 += m_2[j] * vj
-        p_3 += m_3[j] * vj
-    return gap, dual, reach, s_v, p_0, p_1, p_2, p_3
-
-
-@compiled_finite
-def _form(
-    m_0: Float[np.ndarray, " n"],
-    m_1: Float[np.ndarray, " n"],
-    m_2: Float[np.ndarray, " n"],
-    m_3: Float[np.ndarray, " n"],
-    z_l: Float[np.ndarray, " n"],
-    z_u: Float[np.ndarray, " n"],
-    i_l: Float[np.ndarray, " n"],
-    i_u: Float[np.ndarray, " n"],
-    h: Float[np.ndarray, " n"],
-    d_inv: Float[np.ndarray, " n"],
-    system: Float[np.ndarray, "5 5"],
-    right: Float[np.ndarray, " 5"],
-) -> None:
-    """D^-1, the lower triangle of [M; 1'] D^-1 [M; 1']', and [M; 1'] D^-1 (-h)."""
-    s_00 = s_10 = s_11 = s_20 = s_21 = s_22 = 0.0
-    s_30 = s_31 = s_32 = s_33 = s_40 = s_41 = s_42 = s_43 = s_44 = 0.0
-    r_0 = r_1 = r_2 = r_3 = r_4 = 0.0
-    for j in range(h.size):
-        # The floor keeps D invertible where a weight is all but free; it damps the
-        # step a little and leaves the point the iterations end at unchanged.
-        d = 1.0 / (z_l[j] * i_l[j] + z_u[j] * i_u[j] + 1e-14)
-        d_inv[j] = d
-        x = d * h[j]
-        d_0 = d * m_0[j]
-        d_1 = d * m_1[j]
-        d_2 = d * m_2[j]
-        d_3 = d * m_3[j]
-        s_00 += d_0 * m_0[j]
-        s_10 += d_0 * m_1[j]
-        s_20 += d_0 * m_2[j]
-        s_30 += d_0 * m_3[j]
-        s_40 += d_0
-        s_11 += d_1 * m_1[j]
-        s_21 += d_1 * m_2[j]
-        s_31 += d_1 * m_3[j]
-        s_41 += d_1
-        s_22 += d_2 * m_2[j]
-        s_32 += d_2 * m_3[j]
-        s_42 += d_2
-        s_33 += d_3 * m_3[j]
-        s_43 += d_3
-        s_44 += d
-        r_0 -= x * m_0[j]
-        r_1 -= x * m_1[j]
-        r_2 -= x * m_2[j]
-        r_3 -= x * m_3[j]
-        r_4 -= x
-    system[0, 0] = s_00
-    system[1, 0], system[1, 1] = s_10, s_11
-    system[2, 0], system[2, 1], system[2, 2] = s_20, s_21, s_22
-    system[3, 0], system[3, 1], system[3, 2], system[3, 3] = s_30, s_31, s_32, s_33
-    system[4, 0], system[4, 1], system[4, 2] = s_40, s_41, s_42
-    system[4, 3], system[4, 4] = s_43, s_44
-    right[0], right[1], right[2], right[3], right[4] = r_0, r_1, r_2, r_3, r_4
-
-
-@compiled_finite
-def _factor(system: Float[np.ndarray, "5 5"]) -> None:
-    """Cholesky factor in place; a pivot lost to rounding stops its row from moving."""
-    for i in range(5):
-        diagonal = system[i, i]
-        for c in range(i + 1):
-            value = system[i, c]
-            for e in range(c):
-                value -= system[i, e] * system[c, e]
-            if c < i:
-                system[i, c] = value / system[c, c]
-            else:
-                system[i, i] = np.sqrt(value) if value > 1e-15 * diagonal else 1e100
-
-
-@compiled_finite
-def _substitute(
-    factor: Float[np.ndarray, "5 5"],
-    right: Float[np.ndarray, " 5"],
-    solution: Float[np.ndarray, " 5"],
-) -> None:
-    for i in range(5):
-        value = right[i]
-        for c in range(i):
-            value -= factor[i, c] * solution[c]
-        solution[i] = value / factor[i, i]
-    for i in range(4, -1, -1):
-        value = solution[i]
-        for c in range(i + 1, 5):
-            value -= factor[c, i] * solution[c]
-        solution[i] = value / factor[i, i]
-
-
-@compiled_finite
-def _predict(
-    m_0: Float[np.ndarray, " n"],
-    m_1: Float[np.ndarray, " n"],
-    m_2: Float[np.ndarray, " n"],
-    m_3: Float[np.ndarray, " n"],
-    z_l: Float[np.ndarray, " n"],
-    z_u: Float[np.ndarray, " n"],
-    i_l: Float[np.ndarray, " n"],
-    i_u: Float[np.ndarray, " n"],
-    h: Float[np.ndarray, " n"],
-    d_inv: Float[np.ndarray, " n"],
-    step: Float[np.ndarray, " 5"],
-    dv: Float[np.ndarray, " n"],
-    most: Float[np.ndarray, " n"],
-) -> tuple[float, float]:
-    """dv = (-h - M'dpi - 1 dnu) / D, without centring.
-
-    Returns 1 over the step at which a bound or its multiplier reaches 0 (dz_l / z_l is
-    -1 - dv / (1 + v), and likewise above), and the sum of the products of both changes.
-    """
-    e_0, e_1, e_2, e_3, e_4 = step[0], step[1], step[2], step[3], step[4]
-    ahead = 0.0
-    for j in range(h.size):
-        along = e_0 * m_0[j] + e_1 * m_1[j] + e_2 * m_2[j] + e_3 * m_3[j] + e_4
-        change = -d_inv[j] * (h[j] + along)
-        dv[j] = change
-        below = change * i_l[j]
-        above = change * i_u[j]
-        most[j] = max(max(-below, above), max(1.0 + below, 1.0 - above))
-        ahead += change * (z_u[j] * (1.0 - above) - z_l[j] * (1.0 + below))
-    return max(_greatest(most), 0.0), ahead
-
-
-@compiled_finite
-def _correct(
-    m_0: Float[np.ndarray, " n"],
-    m_1: Float[np.ndarray, " n"],
-    m_2: Float[np.ndarray, " n"],
-    m_3: Float[np.ndarray, " n"],
-    z_l: Float[np.ndarray, " n"],
-    z_u: Float[np.ndarray, " n"],
-    i_l: Float[np.ndarray, " n"],
-    i_u: Float[np.ndarray, " n"],
-    h: Float[np.ndarray, " n"],
-    d_inv: Float[np.ndarray, " n"],
-    dv: Float[np.ndarray, " n"],
-    sigma_mu: float,
-    p_l: Float[np.ndarray, " n"],
-    p_u: Float[np.ndarray, " n"],
-    rho: Float[np.ndarray, " n"],
-    right: Float[np.ndarray, " 5"],
-) -> None:
-    """p = (sigma mu - second-order term of the predictor) / slack, rho, and [M; 1'] D^-1 rho."""
-    r_0 = r_1 = r_2 = r_3 = r_4 = 0.0
-    for j in range(h.size):
-        change = dv[j]
-        below = (sigma_mu + change * z_l[j] * (1.0 + change * i_l[j])) * i_l[j]
-        above = (sigma_mu - change * z_u[j] * (1.0 - change * i_u[j])) * i_u[j]
-        p_l[j] = below
-        p_u[j] = above
-        rest = below - above - h[j]
-        rho[j] = rest
-        x = d_inv[j] * rest
-        r_0 += m_0[j] * x
-        r_1 += m_1[j] * x
-        r_2 += m_2[j] * x
-        r_3 += m_3[j] * x
-        r_4 += x
-    right[0], right[1], right[2], right[3], right[4] = r_0, r_1, r_2, r_3, r_4
-
-
-@compiled_finite
-def _step(
-    m_0: Float[np.ndarray, " n"],
-    m_1: Float[np.ndarray, " n"],
-    m_2: Float[np.ndarray, " n"],
-    m_3: Float[np.ndarray, " n"],
-    z_l: Float[np.ndarray, " n"],
-    z_u: Float[np.ndarray, " n"],
-    i_l: Float[np.ndarray, " n"],
-    i_u: Float[np.ndarray, " n"],
-    p_l: Float[np.ndarray, " n"],
-    p_u: Float[np.ndarray, " n"],
-    rho: Float[np.ndarray, " n"],
-    d_inv: Float[np.ndarray, " n"],
-    step: Float[np.ndarray, " 5"],
-    dv: Float[np.ndarray, " n"],
-    most: Float[np.ndarray, " n"],
-) -> float:
-    """dv = (rho - M'dpi - 1 dnu) / D, and 1 over the step at which anything reaches 0.
-
-    dz_l = p_l - z_l - z_l dv / (1 + v), and likewise above.
-    """
-    e_0, e_1, e_2, e_3, e_4 = step[0], step[1], step[2], step[3], step[4]
-    for j in range(rho.size):
-        along = e_0 * m_0[j] + e_1 * m_1[j] + e_2 * m_2[j] + e_3 * m_3[j] + e_4
-        change = d_inv[j] * (rho[j] - along)
-        dv[j] = change
-        below = change * i_l[j]
-        above = change * i_u[j]
-        fall_l = 1.0 + below - p_l[j] / z_l[j]
-        fall_u = 1.0 - above - p_u[j] / z_u[j]
-        most[j] = max(max(-below, above), max(fall_l, fall_u))
-    return max(_greatest(most), 0.0)
-
-
-@compiled_finite
-def _greatest(values: Float[np.ndarray, " n"]) -> float:
-    """Greatest of the values, which are overwritten: halves against each other, in SIMD lanes.
-
-    The compiler does not vectorise a running maximum.
-    """
-    count = values.size
-    while count > 1:
-        half = count // 2
-        left, right = values[:half], values[count - half : count]
-        for j in range(half):
-            left[j] = max(left[j], right[j])
-        count -= half
-    return values[0]  # type: ignore[no-any-return]
+        weights[i, : counts[i]] = 1.0
+        if status[i] != GraspStatus.INFEASIBLE:
+            weights[i, : counts[i]] += spread * v[0]
