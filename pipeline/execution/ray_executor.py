@@ -148,7 +148,7 @@ class Sending:
             return unpacked(answer, names)
         done: Done = unpacked(answer, names, self.store.folder.path.joinpath)
         if self.bring:
-            self.store.bring(done.keys)
+            self.store.bring(done.put, done.removed)
         return done.result
 
 

@@ -101,16 +101,28 @@ class RunStore:
         self.save_notes()
         return brought
 
-    def bring(self, keys: Iterable[str]) -> None:
-        """Bring files that a node has put, and remove those that it has removed."""
+    def bring(self, put: Iterable[str], removed: Iterable[str]) -> None:
+        """Bring files that a node has put, and remove those that it has removed.
+
+        Parameters
+        ----------
+        put
+            Keys of files; those on their way from node to node come too, and are not noted.
+        removed
+            Keys of files.
+
+        Raises
+        ------
+        StoreError
+            The store cannot be used, or another driver has taken the run.
+        """
         self._lease.check()
-        for key in keys:
-            if not belongs_to_run(key):
-                continue
-            if (found := self._store.head(key)) is None:
-                (self.folder.path / key).unlink(missing_ok=True)
-                self._notes.pop(key, None)
-            elif self._is_wanted(found):
+        for key in removed:
+            (self.folder.path / key).unlink(missing_ok=True)
+            self._notes.pop(key, None)
+        for key in put:
+            found = self._store.head(key)
+            if found is not None and self._is_wanted(found):
                 self._fetch(key)
 
     def put_now_and_then(self) -> None:
@@ -173,7 +185,8 @@ class RunStore:
     def _fetch(self, key: str) -> None:
         path = self.folder.path / key
         found = self._store.fetch(key, path)
-        self._notes[key] = Note(found.version, mark_of(path))
+        if belongs_to_run(key):
+            self._notes[key] = Note(found.version, mark_of(path))
 
 
 @contextmanager

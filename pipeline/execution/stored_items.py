@@ -35,10 +35,11 @@ _MIB = 2**20  # bytes, as the prefix says
 
 @dataclass(frozen=True)
 class Done:
-    """What a job has made, and the keys of the files that it has put or removed."""
+    """What a job has made, and the keys of the files that its node has put and removed."""
 
     result: Any
-    keys: tuple[str, ...]
+    put: tuple[str, ...]
+    removed: tuple[str, ...]
 
 
 def packed(value: Any, run: Path | None) -> bytes:
@@ -134,7 +135,8 @@ def run_from_store(sent: bytes, place: Place, program: str) -> bytes:
     named = list(keys)
     node.bring(named)
     result = job(item)
-    return packed(Done(result, tuple(node.put_back())), node.run)
+    put, removed = node.put_back()
+    return packed(Done(result, tuple(put), tuple(removed)), node.run)
 
 
 class NodeFolder:
@@ -183,30 +185,31 @@ class NodeFolder:
                 self._link(key, found.version, path)
             self._marks[key] = _mark(path)
 
-    def put_back(self) -> list[str]:
+    def put_back(self) -> tuple[list[str], list[str]]:
         """Put what was written since files were brought, and remove what was removed.
 
         Returns
         -------
-        The keys of both.
+        The keys of those that were put, and of those that were removed.
 
         Raises
         ------
         StoreError
             The store cannot be used, or another run wrote other bytes there.
         """
-        changed = []
+        put: list[str] = []
+        removed: list[str] = []
         for key, version in self._brought.items():
             path, mark = self.run / key, self._marks[key]
             if not path.is_file():
                 if mark is not None:
                     self._store.remove(key)
-                    changed.append(key)
+                    removed.append(key)
             elif _mark(path) != mark:
                 self._put(key, path, version)
                 path.unlink()  # who needs it brings it: a node keeps no more than it reads
-                changed.append(key)
-        return changed
+                put.append(key)
+        return put, removed
 
     def _put(self, key: str, path: Path, instead_of: str | None) -> None:
         try:

@@ -117,11 +117,14 @@ def test_what_nodes_put_comes_and_what_they_remove_goes(
     machine: Machine, store: ObjectStore
 ) -> None:
     store.put("grasps/00000-of-00001.mcap", b"by a node")
-    store.put(".state/shards/x/0.mcap", b"on its way to another node")
-    machine.run.bring(["grasps/00000-of-00001.mcap", ".state/shards/x/0.mcap"])
-    assert machine.files() == {"grasps/00000-of-00001.mcap": b"by a node"}
+    store.put(".state/shards/x/0.arrow", b"on its way")
+    brought = {"grasps/00000-of-00001.mcap": b"by a node", ".state/shards/x/0.arrow": b"on its way"}
+    machine.run.bring(brought, [])
+    assert machine.files() == brought
+    assert machine.run.put() == 0
+    assert set(store.listed()) == set(brought)
     store.remove("grasps/00000-of-00001.mcap")
-    machine.run.bring(["grasps/00000-of-00001.mcap"])
+    machine.run.bring([], brought)
     assert machine.files() == {}
     machine.run.discard(machine.folder / ".state/shards")
     assert store.listed() == {}

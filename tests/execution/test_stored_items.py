@@ -57,7 +57,7 @@ def test_what_a_job_writes_is_put_and_what_it_removes_is_removed(
     (here.run / "scattered/0").unlink()
     (here.run / "grasps").mkdir()
     (here.run / "grasps/0.mcap").write_bytes(b"made")
-    assert sorted(here.put_back()) == ["grasps/0.mcap", "scattered/0"]
+    assert here.put_back() == (["grasps/0.mcap"], ["scattered/0"])
     assert set(store.listed()) == {"a", "grasps/0.mcap"}
     assert store.read("grasps/0.mcap") == b"made"
     assert not (here.run / "grasps/0.mcap").exists()
@@ -88,9 +88,9 @@ def test_a_stale_file_is_replaced_and_a_finished_one_kept(
     here.bring(["shard"])
     (here.run / "shard").unlink()
     (here.run / "shard").write_bytes(b"current")
-    assert here.put_back() == ["shard"]
+    assert here.put_back() == (["shard"], [])
     here.bring(["shard"])
-    assert here.put_back() == []  # a job that keeps it changes nothing
+    assert here.put_back() == ([], [])  # a job that keeps it changes nothing
     assert store.read("shard") == b"current"
 
 
@@ -105,8 +105,8 @@ def test_of_two_that_make_one_file_the_first_counts_and_another_content_is_refus
         one.bring(["shard"])
         (one.run / "shard").unlink(missing_ok=True)
         (one.run / "shard").write_bytes(made)
-    assert nodes[0].put_back() == ["shard"]
-    assert nodes[1].put_back() == ["shard"]  # taken for lost, and alive
+    assert nodes[0].put_back() == (["shard"], [])
+    assert nodes[1].put_back() == (["shard"], [])  # taken for lost, and alive
     with pytest.raises(StoreError, match=f"{URL}/shard was written by another process"):
         nodes[2].put_back()
     assert store.read("shard") == b"same"
