@@ -11,7 +11,7 @@ import pytest
 from pipeline.execution import RunFolder
 from stages.graph import STAGES
 from tests.docs.pages import blocks_of
-from tests.stages.conftest import TINY
+from tests.stages.conftest import TINY, with_convex_parts
 from tests.stages.project_copy import copied_project, quiet_environment
 
 cluster_utils = pytest.importorskip("ray.cluster_utils", reason="Ray is not installed")
@@ -63,6 +63,7 @@ def test_six_stages_from_cold_write_the_bytes_of_local_processes_though_a_node_d
     folder = RunFolder(copy / "runs" / "ci")
     folder.path.mkdir()
     folder.config.write_text(TINY)
+    with_convex_parts(run, folder.path.parent)
     environment = quiet_environment() | {"RAY_ADDRESS": cluster.address}  # type: ignore[attr-defined]
     dataset = subprocess.Popen(
         DOCUMENTED.split(), cwd=copy, env=environment, stderr=subprocess.PIPE, text=True

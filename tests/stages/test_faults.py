@@ -20,7 +20,7 @@ import pytest
 from pipeline.artifacts import open_artifact
 from pipeline.execution import RunFolder
 from stages.graph import STAGES
-from tests.stages.conftest import ROOT, run_stage
+from tests.stages.conftest import ROOT, run_stage, with_convex_parts
 from tests.stages.test_pipeline import digests
 
 FAILURE, INTERRUPTED = 1, 130
@@ -60,11 +60,6 @@ def before(run: RunFolder, stage: str, runs: Path) -> RunFolder:
         if STAGES[name].sharded:
             shutil.copytree(run.shards(name), folder.shards(name))
     return folder
-
-
-def with_convex_parts(run: RunFolder, runs: Path) -> None:
-    """The cache beside all runs: what is tested is not how objects are cut."""
-    shutil.copytree(run.path.parent / ".cache", runs / ".cache", dirs_exist_ok=True)
 
 
 def size_of(folder: Path) -> int:
