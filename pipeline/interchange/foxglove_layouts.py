@@ -99,11 +99,17 @@ def image_panel(image: str, calibration: str) -> dict[str, Any]:
 def plot_panel(topic: str, across: str, fields: Sequence[str]) -> dict[str, Any]:
     """Fields of a topic's messages over another field of theirs."""
     return {
-        "title": topic.strip("/"),
+        "foxglovePanelTitle": topic.strip("/"),
         "xAxisVal": "custom",
         "xAxisPath": {"value": f"{topic}.{across}", "enabled": True},
         "paths": [
-            {"value": f"{topic}.{field}", "enabled": True, "label": field, "color": colour}
+            {
+                "value": f"{topic}.{field}",
+                "enabled": True,
+                "timestampMethod": "receiveTime",
+                "label": field,
+                "color": colour,
+            }
             for field, colour in zip(fields, PALETTE, strict=False)
         ],
         "showLegend": True,

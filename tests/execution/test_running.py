@@ -11,6 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.execution import RunFolder
+from pipeline.execution.sealing import seal
+
 ROOT = Path(__file__).resolve().parents[2]
 FAILURE, INTERRUPTED = 1, 130
 
@@ -62,6 +65,24 @@ def test_a_second_run_does_nothing_and_says_so(folder: Path) -> None:
     assert times_run(folder) == 1
     assert run(folder, "--force").returncode == 0
     assert times_run(folder) == 2
+
+
+def test_a_stage_of_a_sealed_run_stays_as_it_is_though_everything_changed(folder: Path) -> None:
+    """Make calls it where the run came without its bookkeeping; by force it says why not."""
+    artifact = folder / "counting.mcap"
+    artifact.write_bytes(b"made elsewhere, by another version")
+    seal(RunFolder(folder))
+    (folder / "run.toml").write_text("seed = 2\n")
+    before = artifact.stat()
+    left = run(folder, mood="explained")
+    assert left.returncode == 0, left.stderr
+    assert "counting: " in left.stderr
+    assert "is sealed, and stays as it is" in left.stderr
+    forced = run(folder, "--force")
+    assert forced.returncode == FAILURE
+    assert "make unseal RUN=tiny" in forced.stderr
+    assert artifact.stat().st_mtime_ns == before.st_mtime_ns
+    assert not (folder / "runs.txt").exists()
 
 
 def test_only_configuration_it_reads_makes_it_stale(folder: Path) -> None:

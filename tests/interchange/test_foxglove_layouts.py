@@ -2,9 +2,11 @@
 
 import json
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
+from mcap.reader import make_reader
 
 from pipeline.interchange.foxglove_layouts import foxglove_layout
 from schemas.channels import CHANNELS, channel_of
@@ -21,6 +23,35 @@ TOPICS = {
     "evaluate": ("/attempts", "/levels", "/policies", "/comparisons", "/imperfection"),
     "sweep": ("/budget", "/networks"),
     "of somebody": ("/slenderness",),
+}
+RELEASED = Path(__file__).parents[1] / "artifacts" / "released" / "v1-0.1.0"
+# Panels of Foxglove Studio's published source (its catalogue of panels, and the type of each one's
+# configuration): settings that ours may have, and what these may be.
+TEXT, FLAG = str, bool
+SETTINGS: dict[str, dict[str, Any]] = {
+    "3D": {
+        "followTf": TEXT,
+        "topics": {"*": {"visible": FLAG}},
+        "layers": {"*": {"layerId": ("foxglove.Grid",), "visible": FLAG, "instanceId": TEXT}},
+    },
+    "Image": {"imageMode": {"imageTopic": TEXT, "calibrationTopic": TEXT}},
+    "Plot": {
+        "foxglovePanelTitle": TEXT,
+        "xAxisVal": ("timestamp", "index", "custom", "currentCustom"),
+        "xAxisPath": {"value": TEXT, "enabled": FLAG},
+        "paths": [
+            {
+                "value": TEXT,
+                "enabled": FLAG,
+                "timestampMethod": ("receiveTime", "headerStamp"),
+                "label": TEXT,
+                "color": TEXT,
+            }
+        ],
+        "showLegend": FLAG,
+    },
+    "RawMessages": {"topicPath": TEXT},
+    "Table": {"topicPath": TEXT},
 }
 MESSAGES = (evaluation_pb2, grasps_pb2, objects_pb2, training_pb2)
 
@@ -66,6 +97,50 @@ def test_panels_show_topics_of_the_file_and_fields_of_their_messages(stage: str)
             name = channel.schemas[0].rpartition(".")[2]
             (message,) = (getattr(m, name) for m in MESSAGES if hasattr(m, name))
             assert field in message.DESCRIPTOR.fields_by_name
+
+
+def fits(value: Any, form: Any) -> bool:
+    """Whether a setting is of the form that Foxglove reads, with nothing left out or made up."""
+    if isinstance(form, tuple):
+        return value in form
+    if isinstance(form, list):
+        return isinstance(value, list) and all(fits(inner, form[0]) for inner in value)
+    if isinstance(form, dict):
+        named = dict.fromkeys(value, form["*"]) if "*" in form else form
+        same = isinstance(value, dict) and value.keys() == named.keys()
+        return same and all(fits(value[key], named[key]) for key in named)
+    return type(value) is form
+
+
+@pytest.mark.parametrize("stage", TOPICS)
+def test_panels_are_foxgloves_own_with_settings_that_it_reads(stage: str) -> None:
+    layout = json.loads(foxglove_layout(TOPICS[stage]))
+    assert set(layout) == {
+        *("configById", "globalVariables", "userNodes", "playbackConfig", "layout")
+    }
+    for name, settings in layout["configById"].items():
+        kind, _, number = name.partition("!")
+        assert number
+        assert fits(settings, SETTINGS[kind]), (name, settings)
+        for key, layer in settings.get("layers", {}).items():
+            assert layer["instanceId"] == key
+
+
+@pytest.mark.parametrize("stage", ["objects", "scenes", "grasps", "shards", "train", "evaluate"])
+def test_a_layout_of_a_real_file_names_its_topics_and_fields(stage: str) -> None:
+    """By the schemas that the file itself carries."""
+    with (RELEASED / f"{stage}.mcap").open("rb") as file:
+        found = make_reader(file).get_summary()
+    assert found is not None
+    schema_of = {
+        channel.topic: found.schemas[channel.schema_id] for channel in found.channels.values()
+    }
+    layout = json.loads(foxglove_layout(tuple(schema_of)))
+    paths = [path.partition(".") for path in paths_of(layout["configById"])]
+    assert paths
+    for topic, _, field in paths:
+        assert topic in schema_of
+        assert field.encode() in schema_of[topic].data  # names stand in a descriptor as they are
 
 
 def test_a_picture_is_shown_with_its_own_cameras_intrinsics() -> None:
