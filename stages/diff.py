@@ -155,7 +155,9 @@ def draw(a: Side, b: Side, facts: dict[str, Any], text: str, into: Path) -> None
     rates = tuple([row.rates[side] for row in facts["success"]] for side in (0, 1))
     keys = "".join(read_provenance(side.folder.artifact("objects")).key for side in (a, b))
     recorded = OwnRecording(NAME, into / "diff.rrd", keys)
-    with recording(recorded, blueprint([s.folder.path.name for s in (a, b)])) as stream:
+    there = {"labels": histograms, "error": errors[0], "success": rates[0]}
+    shown = [quantity for quantity, values in there.items() if values]
+    with recording(recorded, blueprint([s.folder.path.name for s in (a, b)], shown)) as stream:
         show_diff(stream, histograms, words, errors, (rates[0], rates[1]), text)
 
 

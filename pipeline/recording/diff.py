@@ -1,4 +1,4 @@
-"""diff.rrd: two runs side by side, A at the left and B at the right."""
+"""diff.rrd: two runs compared, each bar of A with that of B at its right."""
 
 from collections.abc import Mapping, Sequence
 
@@ -12,38 +12,39 @@ from pipeline.recording.recording import set_step, time_panel
 
 TIMELINE = "group"
 SIDES = ("a", "b")
+TITLES = {
+    "labels": "Labels by tenth of q",
+    "error": "Mean error by object, in the order of the table",
+    "success": "Success by policy, in the order of the table",
+}
+BAR = 0.4  # width; what is compared stands around 0, 1, 2 and so on
 
 
-def blueprint(names: Sequence[str]) -> rrb.Blueprint:
-    """Labels, errors and success of either run, in two columns of one layout.
+def blueprint(names: Sequence[str], shown: Sequence[str]) -> rrb.Blueprint:
+    """Labels, errors and success of both runs, their bars side by side on one scale.
 
     Parameters
     ----------
     names
         Names of the two runs.
+    shown
+        What there is to show, of `TITLES`.
 
     Returns
     -------
     How the viewer lays the recording out.
     """
-    columns = [
-        rrb.Vertical(
-            rrb.BarChartView(origin=f"/curves/labels/{side}", name=f"{name}: labels by tenth of q"),
-            rrb.BarChartView(origin=f"/curves/error/{side}", name=f"{name}: error by object"),
-            rrb.BarChartView(origin=f"/curves/success/{side}", name=f"{name}: success by policy"),
-        )
-        for side, name in zip(SIDES, names, strict=True)
+    legend = f"A {names[0]}, B {names[1]}"
+    bars = [
+        rrb.BarChartView(origin=f"/curves/{quantity}", name=f"{TITLES[quantity]}: {legend}")
+        for quantity in shown
     ]
+    result = rrb.TextDocumentView(origin="/notes/result", name="Comparison")
+    group = rrb.TextDocumentView(origin="/notes/group", name="Group")
+    words = rrb.Vertical(group, result, row_shares=[1, 3]) if "labels" in shown else result
+    columns = [rrb.Vertical(*bars), words] if bars else [words]
     return rrb.Blueprint(
-        rrb.Horizontal(
-            *columns,
-            rrb.Vertical(
-                rrb.TextDocumentView(origin="/notes/group", name="Group"),
-                rrb.TextDocumentView(origin="/notes/result", name="Comparison"),
-                row_shares=[1, 3],
-            ),
-            column_shares=[1, 1, 1],
-        ),
+        rrb.Horizontal(*columns, column_shares=[2, 1][-len(columns) :]),
         time_panel(TIMELINE),
         collapse_panels=True,
     )
@@ -75,18 +76,32 @@ def show_diff(
         The whole comparison, Markdown.
     """
     _note(stream, "result", text, static=True)
-    for number, side in enumerate(SIDES):
-        colour = colours.PALETTE[number]
-        for quantity, values in (("error", errors[number]), ("success", success[number])):
-            if len(values):
-                bars = rr.BarChart(np.asarray(values, dtype=float), color=colour)
-                stream.log(f"curves/{quantity}/{side}", bars, static=True)
-    for step, (group, both) in enumerate(histograms.items()):
+    for quantity, both in (("error", errors), ("success", success)):
+        if len(both[0]):
+            _show_bars(stream, quantity, both, static=True)
+    for step, (group, shares) in enumerate(histograms.items()):
         set_step(stream, TIMELINE, step)
         _note(stream, "group", words[group], static=False)
-        for number, side in enumerate(SIDES):
-            bars = rr.BarChart(both[number], color=colours.PALETTE[number])
-            stream.log(f"curves/labels/{side}", bars)
+        _show_bars(stream, "labels", shares, static=False)
+
+
+def _show_bars(
+    stream: rr.RecordingStream,
+    quantity: str,
+    both: tuple[
+        Sequence[float] | Float[np.ndarray, " n"], Sequence[float] | Float[np.ndarray, " n"]
+    ],
+    static: bool,
+) -> None:
+    for number, (side, values) in enumerate(zip(SIDES, both, strict=True)):
+        heights = np.asarray(values, dtype=float)
+        bars = rr.BarChart(
+            heights,
+            abscissa=np.arange(len(heights)) + (number - 1) * BAR,
+            widths=np.full(len(heights), BAR, dtype=np.float32),
+            color=colours.PALETTE[number],
+        )
+        stream.log(f"curves/{quantity}/{side}", bars, static=static)
 
 
 def _note(stream: rr.RecordingStream, subject: str, text: str, static: bool) -> None:
