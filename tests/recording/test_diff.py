@@ -21,7 +21,7 @@ def test_bars_of_both_runs_stand_beside_each_other_with_their_values(tmp_path: P
             (bars,), (places,), (widths,) = (
                 batch[f"BarChart:{name}"].to_pylist() for name in ("values", "abscissa", "widths")
             )
-            numbers = (np.array(next(iter(b[0]["buffer"].values()))) for b in (bars, places))
+            numbers = (np.array(b[0]["buffer"]) for b in (bars, places))
             found[chunk.entity_path] = (*numbers, np.array(widths))
     assert sorted(found) == [f"/curves/error/{side}" for side in SIDES]
     for side, heights in zip(SIDES, values, strict=True):
