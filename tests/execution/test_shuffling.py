@@ -115,7 +115,7 @@ def test_jobs_done_elsewhere_in_any_order_write_the_same_bytes(
     """As processes do them: each job and result pickled, the last job first."""
     stage = ready(grasps, tmp_path / "run", workers=2)
 
-    def backwards(job: Callable[[T], R], items: list[T], *_: object, limit_s: float) -> list[R]:
+    def backwards(job: Callable[[T], R], items: list[T], *_: object, **__: object) -> list[R]:
         pickled = pickle.dumps(items[::-1])
         results = [pickle.dumps(job(item)) for item in pickle.loads(pickled)]  # noqa: S301 - ours
         return [pickle.loads(result) for result in results[::-1]]  # noqa: S301 - ours
