@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 
 from pipeline.config import RunConfig
 from pipeline.sensing.depth_noise import disturb
-from pipeline.sensing.sub_cloud import merged_sub_clouds
+from pipeline.sensing.sub_cloud import cut_into
 from pipeline.world.cameras import PinholeCamera
 from pipeline.world.view import CameraView
 
@@ -59,8 +59,8 @@ def cut_clouds(
     cells = config.sensing.grid_cells
     cloud = np.empty((len(merged), cells, cells, 3), dtype=np.float32)
     mask = np.empty((len(merged), cells, cells), dtype=np.bool_)
+    radius_m = config.gripper.pad.radius_m
     for rows, seen in ((merged, pictures), (~merged, [picture])):
-        cloud[rows], mask[rows] = merged_sub_clouds(
-            seen, world_from_contact[rows], config.sensing, config.gripper.pad.radius_m
-        )
+        chosen = np.flatnonzero(rows)
+        cut_into(seen, world_from_contact, config.sensing, radius_m, chosen, cloud, mask)
     return cloud, mask, np.where(merged, len(pictures), 1)

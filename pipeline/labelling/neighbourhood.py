@@ -38,15 +38,11 @@ def sums_within(
     -------
     Sums, shape (k, 3), and how many points each is of, shape (k,).
     """
-    lower = points_m.min(axis=0)
-    side_m = _WIDER * max(radius_m, float((points_m.max(axis=0) - lower).max()) / _MOST_CELLS)
     return _sums_within(  # type: ignore[no-any-return]
         np.ascontiguousarray(points_m),
         np.ascontiguousarray(values),
         np.ascontiguousarray(around_m),
         radius_m,
-        lower,
-        side_m,
     )
 
 
@@ -56,11 +52,15 @@ def _sums_within(
     values: Float[np.ndarray, "n 3"],
     around: Float[np.ndarray, "k 3"],
     radius: float,
-    lower: Float[np.ndarray, " 3"],
-    side: float,
 ) -> tuple[Float[np.ndarray, "k 3"], Int[np.ndarray, " k"]]:
-    """As `sums_within`, with cells of this side from the least corner."""
+    """As `sums_within`."""
     count = len(points)
+    lower, upper = points[0].copy(), points[0].copy()
+    for i in range(count):
+        for axis in range(3):
+            lower[axis] = min(lower[axis], points[i, axis])
+            upper[axis] = max(upper[axis], points[i, axis])
+    side = _WIDER * max(radius, (upper - lower).max() / _MOST_CELLS)
     cells = np.ones(3, dtype=np.int64)
     for i in range(count):
         for axis in range(3):
