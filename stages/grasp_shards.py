@@ -84,7 +84,7 @@ def synthesize_shard(job: ShardJob) -> ShardResult:
     if is_current(job.shard, job.provenance.key):
         return examined(job)
     draping, world, began = Stopwatch(), LabelledWorld(job), time.process_time()
-    former = {p: read_portion(p.former, world.key(p)) for p in job.portions if p.former}
+    former = {p: world.taken_over(p, p.former) for p in job.portions if p.former}
     portions = [former.get(portion) or world.labelled(portion) for portion in job.portions]
     messages = [message for portion in portions for message in portion]
     with ArtifactWriter(job.shard, job.provenance) as artifact:
@@ -107,11 +107,6 @@ class LabelledWorld:
     job: ShardJob
 
     @cached_property
-    def scene_key(self) -> str:
-        """Key of the scene; no image is read."""
-        return read_key(self.job.scenes, self.job.scene_index)
-
-    @cached_property
     def scene(self) -> ClutterScene:
         """What its cameras saw, and where its objects lie."""
         return read_scene(self.job.scenes, self.job.scene_index)
@@ -122,9 +117,11 @@ class LabelledWorld:
         meshes = {name: item.mesh for name, (item, _) in catalogue(self.job.objects).items()}
         return scene_surfaces(self.scene, meshes, self.job.config.scenes.table_side_m)
 
-    def key(self, portion: Portion) -> str:
-        """Key of a portion of its grasps."""
-        return portion_key(self.job.basis, self.scene_key, portion.number, portion.grasps)
+    def taken_over(self, portion: Portion, former: Path) -> list[GraspMessage]:
+        """A portion of its grasps as a former shard holds it; no image is read."""
+        scene_key = read_key(self.job.scenes, self.job.scene_index)
+        key = portion_key(self.job.basis, scene_key, portion.number, portion.grasps)
+        return read_portion(former, key)
 
     def labelled(self, portion: Portion) -> list[GraspMessage]:
         """Label a portion of its grasps; the first is drawn from the stream of the scene."""
@@ -138,7 +135,8 @@ class LabelledWorld:
             logger.warning("left out: {}", error)
             return []
         size, rounded = config.grasps.samples_per_message, config.sensing.rounded
-        return grasp_messages(batches, size, rounded, self.key(portion))
+        key = portion_key(self.job.basis, self.scene.key, portion.number, portion.grasps)
+        return grasp_messages(batches, size, rounded, key)
 
 
 def examined(job: ShardJob) -> ShardResult:

@@ -15,7 +15,7 @@ from jaxtyping import Int
 from pipeline.artifacts.sharding import shard_path, write_index
 from pipeline.config import RunConfig
 from pipeline.execution import StageContext, Summary, progress, run_in_order, stage_command
-from pipeline.execution.driver_cost import driver_cost
+from pipeline.execution.driver_cost import DriverClock
 from pipeline.execution.items import grasps_basis
 from pipeline.labelling.scene import noise_draws
 from pipeline.labelling.shown_pads import SHOWN_SCENES
@@ -55,7 +55,10 @@ def build(stage: StageContext) -> Summary:
     done = run_in_order(
         synthesize_shard, jobs, stage.workers, stage.executor, limit_s=limit_s, store=store
     )
-    results = list(progress(done, count, "grasps", "scene"))
+    results, clock = [], DriverClock(began, stage.has_workers)
+    for result in progress(done, count, "grasps", "scene"):
+        clock.book(result.spent_s, result.entry.samples)
+        results.append(result)
     histogram = np.sum([result.histogram for result in results], axis=0)
     stage.drawing.seconds += sum(result.recording_s for result in results)
     entries = [result.entry for result in results]
@@ -63,10 +66,7 @@ def build(stage: StageContext) -> Summary:
     taken_over = sum(result.taken_over for result in results)
     made = sum(len(job.portions) for job in jobs) - taken_over
     grown = {"taken_over": taken_over, "made": made, "items_basis": basis}
-    spent_s = sum(result.spent_s for result in results)
-    driver_s = time.process_time() - began - (0.0 if stage.has_workers else spent_s)
-    cost = driver_cost(driver_s, spent_s, sum(r.entry.samples for r in results if r.spent_s))
-    return summary(results, histogram, config) | grown | cost
+    return summary(results, histogram, config) | grown | clock.cost()
 
 
 def former_portions(stage: StageContext, basis: str) -> dict[tuple[int, int], Path]:

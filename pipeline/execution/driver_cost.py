@@ -1,7 +1,60 @@
 """What the driver of a cluster spends itself, and how large a cluster it keeps busy with that."""
 
+import time
+
 NODE_CORES = 8  # of the nodes that are counted
 LEAST_S = 1e-3  # a driver is never free, whatever its clock finds
+
+
+class DriverClock:
+    """Tells a driver's start from what each result costs it.
+
+    Parameters
+    ----------
+    began
+        Processor time of this process when the driver began [s].
+    has_workers
+        Whether items are made in other processes than this one.
+    """
+
+    def __init__(self, began: float, has_workers: bool) -> None:
+        self._began, self._has_workers = began, has_workers
+        self._first = began
+        self._start_s = 0.0
+        self._results = 0
+        self._workers_s = 0.0
+        self._grasps = 0
+
+    def book(self, spent_s: float, grasps: int) -> None:
+        """Note a result as it arrives.
+
+        Parameters
+        ----------
+        spent_s
+            Processor time of making it, wherever that was [s]; 0: it was there already.
+        grasps
+            How many it holds.
+        """
+        self._results += 1
+        if self._results == 1:  # by now jobs are planned, processes started and given work
+            self._first = time.process_time()
+            self._start_s = self._first - self._began - (0.0 if self._has_workers else spent_s)
+        elif spent_s:
+            self._workers_s += spent_s
+            self._grasps += grasps
+
+    def cost(self) -> dict[str, float]:
+        """The driver's start, and what the results after the first cost it, until now.
+
+        Returns
+        -------
+        `driver_start_s` [s] and what `driver_cost` tells; nothing where there are no such results.
+        """
+        spent_s = (
+            time.process_time() - self._first - (0.0 if self._has_workers else self._workers_s)
+        )
+        cost = driver_cost(spent_s, self._workers_s, self._grasps)
+        return {"driver_start_s": round(self._start_s, 4), **cost} if cost else {}
 
 
 def driver_cost(driver_s: float, workers_s: float, grasps: int) -> dict[str, float]:

@@ -1,8 +1,10 @@
 """A driver's own time tells how many nodes it keeps busy."""
 
+import time
+
 import pytest
 
-from pipeline.execution.driver_cost import driver_cost
+from pipeline.execution.driver_cost import DriverClock, driver_cost
 
 
 def test_a_driver_of_one_second_feeds_as_many_cores_as_workers_seconds() -> None:
@@ -13,3 +15,25 @@ def test_a_driver_of_one_second_feeds_as_many_cores_as_workers_seconds() -> None
 
 def test_of_nothing_made_nothing_is_said() -> None:
     assert driver_cost(0.1, 0.0, 0) == {}
+
+
+@pytest.mark.parametrize(("has_workers", "of_driver"), [(True, 2.0), (False, 0.5)])
+def test_the_start_is_told_apart_and_work_in_the_driver_s_process_is_not_the_driver_s(
+    monkeypatch: pytest.MonkeyPatch, has_workers: bool, of_driver: float
+) -> None:
+    seen = iter([14.0, 16.0])  # at the first result, and at the end
+    monkeypatch.setattr(time, "process_time", lambda: next(seen))
+    clock = DriverClock(10.0, has_workers)
+    clock.book(3.0, 500)
+    clock.book(1.5, 1000)
+    clock.book(0.0, 400)  # it was there already
+    cost = clock.cost()
+    assert cost["driver_start_s"] == pytest.approx(4.0 if has_workers else 1.0)
+    assert cost["driver_s_per_1000_grasps"] == pytest.approx(of_driver)
+    assert cost["nodes_one_driver_feeds"] == pytest.approx(1.5 / of_driver / 8, abs=0.05)
+
+
+def test_of_one_result_nothing_is_said() -> None:
+    clock = DriverClock(0.0, has_workers=True)
+    clock.book(1.0, 10)
+    assert clock.cost() == {}
