@@ -52,7 +52,7 @@ def memory_picture(samples: list[Sample]) -> str:
             axes.axvline(start, color="0.6", lw=0.8)
             axes.text(start, 1.0, f" {stage}", transform=axes.get_xaxis_transform(), va="bottom")
         axes.set(xlabel="time [min]", ylabel="resident memory [MiB]", ylim=(0, None))
-        axes.legend(loc="upper right")
+        axes.legend(loc="upper center")
         return svg_text(figure)
 
 

@@ -24,6 +24,7 @@ PAGES = {  # page of the repository → file of the site
     "runs/FIRST_HOUR.md": "first_hour.html",
     "runs/ON_YOUR_ROBOT.md": "robot.html",
     "runs/README.md": "running.html",
+    "runs/MILLION.md": "million.html",
     "stages/README.md": "stages.html",
     "schemas/README.md": "files.html",
     "schemas/TABLES.md": "tables.html",

@@ -8,6 +8,7 @@ PAGES = (
     "README.md",
     "pipeline/README.md",
     "runs/FIRST_HOUR.md",
+    "runs/MILLION.md",
     "runs/ON_YOUR_ROBOT.md",
     "runs/README.md",
     "schemas/README.md",
@@ -55,6 +56,14 @@ REDUCED = {
     "make board RUN=ci POSES=board/poses.json CALIBRATION=board/cell.json square_mm=30": (
         "make -n board RUN=ci POSES=board/poses.json CALIBRATION=board/cell.json square_mm=30",
         "it needs pictures; tests/robot/test_board.py draws some",
+    ),
+    ".venv/bin/python -m pipeline.benchmarks.watching million watched.jsonl": (
+        ".venv/bin/python -m pipeline.benchmarks.watching --help",
+        "an hour; tests/benchmarks/test_watching.py watches a command of its own",
+    ),
+    ".venv/bin/python -m pipeline.benchmarks.memory_picture watched.jsonl memory.svg": (
+        ".venv/bin/python -m pipeline.benchmarks.memory_picture --help",
+        "it draws what the command before it writes; tests/benchmarks/test_watching.py draws",
     ),
     "make calibrate RUN=ci": (
         "make -n calibrate RUN=ci",
