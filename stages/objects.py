@@ -57,7 +57,7 @@ def build(stage: StageContext) -> Summary:
     )
     left_out, most = LeftOut(), Allowance(config.max_seconds, config.max_memory_mib)
     former = objects_by_key(stage.output)
-    with Isolation(stage.workers, most, stage.executor_alone) as apart:
+    with Isolation(stage.workers, most, stage.executor_here()) as apart:
         measured = measure(stage, jobs, apart, left_out)
         plan, objects = finish(stage, measured, planned, apart, left_out, former)
         solids = random_solids(stage, plan, apart, left_out, former)

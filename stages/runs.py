@@ -10,6 +10,7 @@ from loguru import logger
 from pipeline.config import load_run_config
 from pipeline.errors import ArtifactError, SoftgripError
 from pipeline.execution.commands import EXIT_FAILURE, run_command
+from pipeline.execution.run_store import opened, store_named_in
 from pipeline.execution.sealing import broken_files, is_sealed, read_seal, refuse_sealed
 from pipeline.execution.sealing import seal as seal_run
 from pipeline.execution.sealing import unseal as unseal_run
@@ -100,13 +101,21 @@ def seal(run: RunName = "default", runs_dir: RunsDir = RUNS_DIR) -> None:
     """Record every file of a run; nothing in it is made anew from then on."""
     folder = RunFolder(runs_dir / run)
     refuse_sealed(folder)
-    logger.info("{} is sealed: {} files", folder.path, len(seal_run(folder).files))
+    with opened(folder, store_named_in(folder), "seal") as store:
+        refuse_sealed(folder)  # its seal may have come from the store
+        logger.info("{} is sealed: {} files", folder.path, len(seal_run(folder).files))
+        if store is not None:
+            store.put()
 
 
 @app.command()
 def unseal(run: RunName = "default", runs_dir: RunsDir = RUNS_DIR) -> None:
     """Take a run's seal off: what is stale is made anew again."""
-    unseal_run(RunFolder(runs_dir / run))
+    folder = RunFolder(runs_dir / run)
+    with opened(folder, store_named_in(folder), "unseal") as store:
+        unseal_run(folder)
+        if store is not None:
+            store.put()
     logger.info("{} is no longer sealed", runs_dir / run)
 
 

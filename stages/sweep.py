@@ -76,7 +76,7 @@ def build(stage: StageContext) -> Summary:
         train_member,
         jobs,
         stage.workers,
-        stage.executor_alone,
+        stage.executor_here(),
         ahead_per_worker=64,
         store=stage.store,
     )

@@ -25,6 +25,7 @@ FULL_STATUS = 507  # HTTP: insufficient storage
 EXPIRED = {"ExpiredToken", "ExpiredTokenException", "RequestExpired", "TokenRefreshRequired"}
 FORBIDDEN_STATUS = (401, 403)  # HTTP: not authenticated, not allowed
 INSTANCE = "169.254."  # where a cloud's machine asks for its role, when no credentials are set
+MOST_RETRIES = 2**31 - 1  # no bound but the time: what counts is how long a store is away
 GO_ON = "run the same command again: what is finished is kept"
 
 _CODE = re.compile(r"<Code>(\w+)</Code>")
@@ -76,7 +77,10 @@ class ObjectStore:
         with self._told():
             self._transport: Any = transport or self._library.store.from_url(
                 self.url,
-                retry_config={"retry_timeout": timedelta(seconds=patience_s)},
+                retry_config={
+                    "max_retries": MOST_RETRIES,
+                    "retry_timeout": timedelta(seconds=patience_s),
+                },
             )
 
     def head(self, key: str) -> StoredObject | None:

@@ -33,6 +33,7 @@ STAMPS = (".key", ".lock")
 # Scattered samples are on their way from node to node.
 PASSING = (STATE, "shards")
 NOT_OF_STAGES = ("logs", "export", "publish", "real", "robot")  # folders that goals beside write
+LOOKED_AT_S = 10.0  # a person waits for `make status`: no longer for a store that does not answer
 PUT_EVERY_S = 30.0  # while local processes work: what a killed machine may lose
 
 
@@ -244,6 +245,14 @@ def place_of(folder: RunFolder, config: StoreConfig) -> Place | None:
     return Place(f"{url.rstrip('/')}/{name}", config.cache_mib, config.patience_s)
 
 
+def store_named_in(folder: RunFolder) -> StoreConfig:
+    """The store that run.toml names; none where this softgrip cannot read it, as of an old run."""
+    try:
+        return load_run_config(folder.config).store
+    except ConfigError:
+        return StoreConfig()
+
+
 def fetch_configuration(folder: RunFolder) -> None:
     """Bring run.toml where this machine has none and RUN_STORE names a store."""
     if folder.config.is_file() or not os.environ.get(VARIABLE):
@@ -276,7 +285,7 @@ def look(folder: RunFolder) -> list[str]:
     place = place_of(folder, load_run_config(folder.config).store)
     if place is None:
         return []
-    store = ObjectStore(place.url, place.patience_s)
+    store = ObjectStore(place.url, min(place.patience_s, LOOKED_AT_S))
     store.put(CLOCK, b"")
     held = [found for key, found in store.listed().items() if belongs_to_run(key)]
     size_mb = sum(found.size for found in held) / 1e6

@@ -5,6 +5,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from loguru import logger
+
 from pipeline.artifacts import Input, Provenance, package_version
 from pipeline.config import RunConfig
 from pipeline.execution.executors import Executor
@@ -118,10 +120,12 @@ class StageContext:
         """Whether work items run in other processes than this one."""
         return self.executor != "local" or self.workers > 1
 
-    @property
-    def executor_alone(self) -> Executor:
-        """Where work runs whose files are none of the run's: with a store, on this machine."""
-        return self.executor if self.store is None else "local"
+    def executor_here(self) -> Executor:
+        """Where work runs whose files are none of the run's: with a store here, which is told."""
+        if self.store is None or self.executor == "local":
+            return self.executor
+        logger.info("{}: its work stays on this machine, the run lies in a store", self.name)
+        return "local"
 
     @property
     def recording_id(self) -> str:

@@ -103,14 +103,14 @@ class Lease:
         try:
             held = self._store.head(LEASE)
             if held is None:
-                return self._store.put_if(LEASE, self._mine.to_json(), None)
+                return self._put_mine(None)
             holder = holder_of(self._store)
             silent_s = (self._now() - held.modified).total_seconds()
             if holder and not holder.released and not has_ended(holder.process):
                 if silent_s < self._lease_s:
                     raise self._in_use(holder, silent_s)
                 logger.warning("{} is silent for {:.0f} s: going on here", holder.name, silent_s)
-            return self._store.put_if(LEASE, self._mine.to_json(), held.version)
+            return self._put_mine(held.version)
         except TakenError as error:
             raise self._in_use(holder_of(self._store), 0.0) from error
 
@@ -131,7 +131,18 @@ class Lease:
     def _put(self, released: bool) -> None:
         mine = self._mine
         self._mine = Holder(mine.name, mine.process, mine.renewed + 1, released)
-        self._version = self._store.put_if(LEASE, self._mine.to_json(), self._version)
+        self._version = self._put_mine(self._version)
+
+    def _put_mine(self, instead_of: str | None) -> str:
+        """Put what this process says, if nobody else has put anything; the lease's version."""
+        try:
+            return self._store.put_if(LEASE, self._mine.to_json(), instead_of)
+        except TakenError:
+            # An answer that was lost is asked for again, and then the first one stands there.
+            found = self._store.head(LEASE)
+            if found is None or holder_of(self._store) != self._mine:
+                raise
+            return found.version
 
     def _renew(self) -> None:
         """Renew until the context ends; the whole life of the thread."""

@@ -1,6 +1,7 @@
 """One driver at a time makes a run in a store; one that is dead, or silent, is followed."""
 
 import time
+from pathlib import Path
 
 import pytest
 from obstore.store import MemoryStore
@@ -80,3 +81,26 @@ def test_a_lease_that_cannot_be_read_is_taken_over_when_it_is_old(store: ObjectS
     store.put(LEASE, b"not JSON")
     with Lease(store, "grasps", 60.0) as held:
         held.check()
+
+
+class LosingAnswers(ObjectStore):
+    """Its first conditional put happens, and the answer is lost: the request is made again."""
+
+    lost = False
+
+    def put_if(self, key: str, content: Path | bytes, instead_of: str | None) -> str:
+        """Put twice, the first time."""
+        if not self.lost:
+            self.lost = True
+            super().put_if(key, content, instead_of)
+        return super().put_if(key, content, instead_of)
+
+
+def test_a_lost_answer_is_not_taken_for_another_driver() -> None:
+    store = LosingAnswers("s3://bucket/run", 1.0, MemoryStore())
+    with Lease(store, "grasps", 60.0) as held:
+        held.check()
+        store.lost = False  # and once more at the end
+    found = holder_of(store)
+    assert found is not None
+    assert found.released
