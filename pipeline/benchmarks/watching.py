@@ -19,7 +19,7 @@ from pipeline.execution import run_command
 
 DATASET = ("objects", "scenes", "grasps", "shards")
 KIB = 1024  # bytes in what the kernel writes as kB
-MIB = 2**20
+MIB = 2**20  # bytes, as the prefix says
 
 
 @dataclass(frozen=True)
