@@ -11,7 +11,10 @@ from jaxtyping import Int
 from loguru import logger
 
 from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact
+from pipeline.artifacts.publishing import published
 from pipeline.artifacts.sharding import is_current, shard_entry
+from pipeline.asking.cache import write_rows
+from pipeline.asking.label_rows import grasp_part
 from pipeline.config import RunConfig
 from pipeline.errors import SceneError
 from pipeline.execution import generator
@@ -35,6 +38,7 @@ from pipeline.stopwatch import Stopwatch
 from pipeline.world.raycasting import RayScene
 from pipeline.world.scene import ClutterScene
 from schemas.softgrip.v1.grasps_pb2 import ShardEntry
+from schemas.tables import BY_NAME
 
 
 @dataclass(frozen=True)
@@ -55,6 +59,7 @@ class ShardJob:
     basis: str  # of the keys of portions
     pads: int  # of its grasps, shown in the recording
     shard: Path
+    rows: Path  # gets the rows of its grasps, as `make query` and the stage's check ask them
     objects: Path
     scenes: Path
     config: RunConfig
@@ -69,6 +74,7 @@ class ShardResult:
     histogram: Int[np.ndarray, " tenths"]  # of its grasps by tenth of q
     object_names: tuple[str, ...]
     status: dict[str, int]
+    rows_s: float  # processor time of writing its rows
     taken_over: int = 0  # portions
     recording_s: float = 0.0  # processor time of draping the pads that are shown
     spent_s: float = 0.0  # processor time of all of it, where it was made
@@ -140,7 +146,8 @@ class LabelledWorld:
 
 
 def examined(job: ShardJob) -> ShardResult:
-    """What a finished shard holds, read back from the file itself."""
+    """What a finished shard holds, read back from the file itself; its rows are written."""
+    rows, writing, first = [], Stopwatch(), 0
     histogram, names, split = np.zeros(TENTHS, dtype=np.int64), set(), ""
     status: Counter[str] = Counter()
     with open_artifact(job.shard) as artifact:
@@ -149,7 +156,12 @@ def examined(job: ShardJob) -> ShardResult:
             histogram += quality_histogram(grasps.quality)
             names |= {origin.object_names[i] for i in np.unique(grasps.object_index)}
             status.update(origin.status_names[s] for s in grasps.status)
+            with writing.running():
+                rows.append(grasp_part(origin, grasps, first))
+            first += len(grasps)
+    with writing.running(), published(job.rows) as scratch:
+        write_rows(scratch, BY_NAME["grasps"], iter(rows))
     # A shard of a scene that was left out holds no grasp to tell the split.
     split = split or LabelledWorld(job).scene.split
     entry = shard_entry(job.shard, job.shard.parent.parent, int(histogram.sum()), split)
-    return ShardResult(entry, histogram, tuple(sorted(names)), dict(status))
+    return ShardResult(entry, histogram, tuple(sorted(names)), dict(status), writing.seconds)

@@ -5,6 +5,7 @@ A-2 airtight, rigid objects (the catalogue's closed meshes), A-3 no object weigh
 torques about x, y (the wrench of pipeline/gripper/wrench has four rows).
 """
 
+import shutil
 import time
 from collections import Counter
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 from jaxtyping import Int
 
 from pipeline.artifacts.sharding import shard_path, write_index
+from pipeline.asking.cache import QUERY_CACHE, keep_rows
 from pipeline.config import RunConfig
 from pipeline.execution import StageContext, Summary, progress, run_in_order, stage_command
 from pipeline.execution.driver_cost import DriverClock
@@ -44,6 +46,7 @@ def build(stage: StageContext) -> Summary:
             basis=basis,
             pads=pads if index in recorded else 0,
             shard=shard_path(stage.shards, index, count),
+            rows=stage.folder.state(stage.name) / f"{index:05d}.arrow",
             objects=stage.upstream("objects"),
             scenes=scenes,
             config=config,
@@ -63,6 +66,11 @@ def build(stage: StageContext) -> Summary:
     stage.drawing.seconds += sum(result.recording_s for result in results)
     entries = [result.entry for result in results]
     write_index(stage.output, provenance, entries, histogram)
+    with stage.checking.running():
+        rows = [job.rows for job in jobs]
+        keep_rows("grasps", stage.output, stage.folder.state(QUERY_CACHE), rows)
+    stage.checking.seconds += sum(result.rows_s for result in results)
+    shutil.rmtree(stage.folder.state(stage.name))
     taken_over = sum(result.taken_over for result in results)
     made = sum(len(job.portions) for job in jobs) - taken_over
     grown = {"taken_over": taken_over, "made": made, "items_basis": basis}

@@ -3,10 +3,13 @@
 from dataclasses import replace
 from pathlib import Path
 
+import pyarrow as pa
 import pytest
 from loguru import logger
 
 from pipeline.artifacts import read_provenance
+from pipeline.asking.cache import QUERY_CACHE, arrow_table
+from pipeline.asking.rows import ROWS
 from pipeline.config import load_run_config
 from pipeline.errors import SceneError
 from pipeline.execution import RunFolder
@@ -25,6 +28,7 @@ def unseen(run: RunFolder, tmp_path: Path) -> ShardJob:
         basis="a basis",
         pads=2,
         shard=tmp_path / "shard.mcap",
+        rows=tmp_path / "rows.arrow",
         objects=run.artifact("objects"),
         scenes=run.artifact("scenes"),
         config=config.model_copy(update={"grasps": grasps}),
@@ -51,3 +55,15 @@ def test_where_clutters_may_be_left_out_its_shard_is_empty_and_says_so(unseen: S
     assert len(told) == 1
     assert told[0].startswith("left out: No camera of scene")
     assert shown_grasps((), job.shard) == []
+    assert pa.ipc.open_file(job.rows).read_all().num_rows == 0
+
+
+def test_the_rows_that_the_stage_leaves_are_those_of_its_shards(
+    run: RunFolder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read_back = arrow_table("grasps", run.artifact("grasps"), tmp_path).to_pylist()
+    assert read_back
+    monkeypatch.setitem(ROWS, "grasps", lambda path: pytest.fail(f"{path} is read for its rows"))
+    kept = arrow_table("grasps", run.artifact("grasps"), run.state(QUERY_CACHE))
+    assert kept.to_pylist() == read_back
+    assert not run.state("grasps").exists()
