@@ -141,7 +141,7 @@ def planned(folder: RunFolder, mesh_dir: Path | None, goals: list[str]) -> list[
         return stage_context(MADE[name], folder, inputs_of, mesh_dir, workers=1)
 
     return [
-        forecast(name, reason, config, sources, others, kept)
+        forecast(name, reason, config, sources, others, kept, scans=bool(meshes))
         for name, reason in reasons(folder, mesh_dir, wanted).items()
         if reason and not reason.startswith(RECORDING_ALONE)
         for kept in [taken_over(name, context_of, work_of(name, config, sources))]

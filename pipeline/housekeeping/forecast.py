@@ -5,10 +5,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from pipeline.artifacts import read_provenance
 from pipeline.config import RunConfig
+from pipeline.errors import ArtifactError
 from pipeline.execution.running import read_summary
 from pipeline.execution.stage import RunFolder
-from pipeline.housekeeping.listing import as_table, disk_use_bytes, size_in_words
+from pipeline.housekeeping.listing import MESHES, as_table, disk_use_bytes, size_in_words
 
 MINUTE_S, HOUR_S = 60.0, 3600.0  # an hour has 60 minutes of 60 seconds
 
@@ -128,8 +130,8 @@ def _counts(value: object) -> list[float]:
     return [float(value)] if isinstance(value, int | float) else []
 
 
-def taken_by(folder: RunFolder, stage: str, config: RunConfig) -> Taken | None:
-    """What a stage took in a run; None where it was not made, or by another kind of network.
+def taken_by(folder: RunFolder, stage: str, config: RunConfig, scans: bool) -> Taken | None:
+    """What a stage took in a run; None where it was not made, or is of another kind.
 
     Parameters
     ----------
@@ -139,6 +141,9 @@ def taken_by(folder: RunFolder, stage: str, config: RunConfig) -> Taken | None:
         Name of the stage.
     config
         Configuration of the run to be made: one network takes many times as long as another.
+    scans
+        Whether the run to be made reads a folder of meshes: a scan takes several times as long to
+        be repaired and cut into convex parts as an embedded object.
 
     Returns
     -------
@@ -154,9 +159,20 @@ def taken_by(folder: RunFolder, stage: str, config: RunConfig) -> Taken | None:
         or summary.get("channels") != list(config.network.channels)
     ):
         return None
+    if stage == "objects" and scans != reads_scans(folder):
+        return None
     files = (folder.artifact(stage), folder.shards(stage), folder.recording(stage))
     size = sum(map(disk_use_bytes, files))
     return Taken(folder.path.name, units, made, float(summary["wall_time_s"]), size)
+
+
+def reads_scans(folder: RunFolder) -> bool:
+    """Whether the objects of a run are of a folder of meshes; False where that cannot be read."""
+    try:
+        inputs = read_provenance(folder.artifact("objects")).inputs
+    except ArtifactError:
+        return False
+    return any(used.path.startswith(MESHES) for used in inputs)
 
 
 def forecast(
@@ -166,8 +182,11 @@ def forecast(
     sources: int,
     others: Sequence[RunFolder],
     kept: float = 0.0,
+    scans: bool = False,
 ) -> Forecast:
-    """Scale what the run of most equal work took.
+    """Scale what the run of most equal work took; of objects, the run that was slowest on each.
+
+    Convex parts are kept beside all runs, and a run that found its own there took little time.
 
     Parameters
     ----------
@@ -183,6 +202,8 @@ def forecast(
         Runs that may tell; the run itself, made earlier, among them.
     kept
         How much of the work is there already and is taken over [units of `work_of`].
+    scans
+        Whether the run reads a folder of meshes.
 
     Returns
     -------
@@ -193,10 +214,13 @@ def forecast(
     reason = in_short(reason)
     if kept > 0:
         reason += f"; {min(kept, units):.0f} of {units:.0f} {stage} are taken over"
-    told = [taken for folder in others if (taken := taken_by(folder, stage, config))]
+    told = [taken for folder in others if (taken := taken_by(folder, stage, config, scans))]
     if not told or units <= 0:
         return Forecast(stage, reason)
-    nearest = min(told, key=lambda taken: abs(math.log(taken.made / (new or units))))
+    if stage == "objects":
+        nearest = max(told, key=lambda taken: taken.wall_time_s / taken.made)
+    else:
+        nearest = min(told, key=lambda taken: abs(math.log(taken.made / (new or units))))
     time_s = nearest.wall_time_s * new / nearest.made
     return Forecast(stage, reason, time_s, nearest.size_bytes * units / nearest.units, nearest.run)
 

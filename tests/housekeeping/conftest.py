@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from pipeline.artifacts import ArtifactWriter, Provenance
+from pipeline.artifacts import ArtifactWriter, Input, Provenance
 from pipeline.execution import RunFolder
 from pipeline.execution.freshness import Key
 
@@ -23,10 +23,19 @@ def make_run(path: Path, toml: str = "") -> RunFolder:
     return folder
 
 
-def make_stage(folder: RunFolder, stage: str, **figures: Any) -> None:
+def make_stage(
+    folder: RunFolder, stage: str, inputs: tuple[Input, ...] = (), **figures: Any
+) -> None:
     key = key_of(stage)
     made = Provenance(
-        stage, key.digest, key.config_digest, key.code_digest, 0, (), "1", key_parts=key.to_json()
+        stage,
+        key.digest,
+        key.config_digest,
+        key.code_digest,
+        0,
+        inputs,
+        "1",
+        key_parts=key.to_json(),
     )
     with ArtifactWriter(folder.artifact(stage), made):
         pass

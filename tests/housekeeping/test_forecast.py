@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.artifacts import Input
 from pipeline.config import RunConfig, load_run_config
 from pipeline.housekeeping.forecast import (
     Forecast,
@@ -89,6 +90,24 @@ def test_another_network_tells_nothing_of_training(tmp_path: Path, config: RunCo
     assert forecast("train", "x", config, 20, [folder]) == Forecast("train", "x")
     make_stage(folder, "train", layers=18, channels=list(config.network.channels), **like)
     assert forecast("train", "x", config, 20, [folder]).wall_time_s == pytest.approx(120.0)
+
+
+def test_scans_are_told_by_scans_and_by_the_run_that_had_to_cut_them(
+    tmp_path: Path, config: RunConfig
+) -> None:
+    """Embedded objects are cut in no time, and parts that are kept beside all runs in none."""
+    runs = {name: make_run(tmp_path / name) for name in ("embedded", "cut", "found")}
+    scan = (Input("meshes/mug.ply", "0" * 64),)
+    make_stage(runs["embedded"], "objects", objects=20, wall_time_s=4.0)
+    others = list(runs.values())
+    unknown = forecast("objects", "x", config, 20, others[:1], scans=True)
+    assert unknown == Forecast("objects", "x")
+    make_stage(runs["cut"], "objects", scan, objects=10, wall_time_s=60.0)
+    make_stage(runs["found"], "objects", scan, objects=20, wall_time_s=5.0)
+    found = forecast("objects", "x", config, 20, others, scans=True)
+    assert (found.wall_time_s, found.told_by) == (pytest.approx(120.0), "cut")
+    found = forecast("objects", "x", config, 20, others)
+    assert (found.wall_time_s, found.told_by) == (pytest.approx(4.0), "embedded")
 
 
 def test_a_summary_without_its_artifact_tells_nothing(tmp_path: Path, config: RunConfig) -> None:
