@@ -127,10 +127,15 @@ def remedy_of(sql: str, reason: str, artifacts: Mapping[str, Path]) -> str:
         stages = dict.fromkeys(BY_NAME[name].stage for name in missing)
         return f"Make them first, or leave out {', '.join(missing)}: {', '.join(stages)} not made"
     if not asked:
-        return f"Tables are {', '.join(BY_NAME)}"
+        unknown = re.search(r"Table with name (\w+)", reason)
+        return f"{_nearest(unknown, list(BY_NAME))}Tables are {', '.join(BY_NAME)}"
     columns = {name: [column.name for column in BY_NAME[name].columns] for name in asked}
     every = [column for names in columns.values() for column in names]
-    quoted = re.search(r'column "([^"]+)"', reason)
-    near = difflib.get_close_matches(quoted[1], every, n=1) if quoted else []
+    unknown = re.search(r'column "([^"]+)"', reason)
     told = "; ".join(f"{name}: {', '.join(names)}" for name, names in columns.items())
-    return f"{f'Did you mean {near[0]}? ' if near else ''}Columns are {told}"
+    return f"{_nearest(unknown, every)}Columns are {told}"
+
+
+def _nearest(unknown: re.Match[str] | None, names: list[str]) -> str:
+    near = difflib.get_close_matches(unknown[1], names, n=1) if unknown else []
+    return f"Did you mean {near[0]}? " if near else ""

@@ -153,7 +153,7 @@ def test_a_file_whose_words_are_gone_is_named(tmp_path: Path, provenance: Proven
         ("SELECT qq FROM grasps", "Columns are grasps: scene, grasp, viewpoint"),
         ("SELECT qualit FROM objects", "objects: object, split, shape_class"),
         ("SELEC q FROM grasps", "syntax error"),
-        ("SELECT * FROM gasps", "Tables are objects, refused, scenes, placed_objects, grasps"),
+        ("SELECT * FROM gasps", "Did you mean grasps? Tables are objects, refused, scenes"),
         ("SELECT made FROM cache", "Tables are"),
         ("SELECT status + q FROM grasps", "Columns are grasps"),
     ],
