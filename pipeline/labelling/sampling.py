@@ -327,7 +327,7 @@ def tangents(
     return frames[:, :3, 0], frames[:, :3, 1]
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
 def _frames(
     contacts: Float[np.ndarray, "n 3"],
     normals: Float[np.ndarray, "n 3"],
@@ -358,7 +358,7 @@ def _frames(
     return frames
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
 def _cosines(
     points: Float[np.ndarray, "n 3"],
     directions: Float[np.ndarray, "n 3"],

@@ -110,13 +110,7 @@ class RayScene:
 
     def normals_at(self, hits: RayHits) -> Float[np.ndarray, "n 3"]:
         """Unit outward normal of the triangle each ray hit; NaN where nothing was hit."""
-        normals = np.full((len(hits.body), 3), np.nan)
-        hit = hits.body >= 0
-        faces = self._first_face[hits.body[hit]] + hits.triangle[hit]
-        corners = self._corners[faces]
-        cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        normals[hit] = cross / np.linalg.norm(cross, axis=1, keepdims=True)
-        return normals
+        return np.asarray(_normals(self._corners, hits.body, hits.triangle, self._first_face))
 
     def barycentric_at(
         self, hits: RayHits, points_m: Float[np.ndarray, "n 3"]
@@ -222,6 +216,27 @@ def _prepared(
             near[i, axis] = np.float32((origins[i, axis] - centre[axis]) * scale)
             along[i, axis] = np.float32(unit[i, axis])
     return unit, near, along, sound
+
+
+@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def _normals(
+    corners: Float[np.ndarray, "m 3 3"],
+    body: Int[np.ndarray, " n"],
+    triangle: Int[np.ndarray, " n"],
+    first_face: Int[np.ndarray, " bodies"],
+) -> Float[np.ndarray, "n 3"]:
+    """Unit normals of triangles of bodies; NaN where there is no body or no area."""
+    normals = np.full((len(body), 3), np.nan)
+    for i in range(len(body)):
+        if body[i] < 0:
+            continue
+        a, b, c = corners[first_face[body[i]] + triangle[i]]
+        ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+        nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        length = np.sqrt(nx * nx + ny * ny + nz * nz)
+        normals[i, 0], normals[i, 1], normals[i, 2] = nx / length, ny / length, nz / length
+    return normals
 
 
 @numba.njit(cache=True)  # type: ignore[untyped-decorator]

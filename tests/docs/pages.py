@@ -11,6 +11,7 @@ PAGES = (
     "runs/MILLION.md",
     "runs/ON_YOUR_ROBOT.md",
     "runs/README.md",
+    "runs/SPEED.md",
     "schemas/README.md",
     "stages/README.md",
 )
