@@ -11,9 +11,8 @@ from jaxtyping import Int
 from loguru import logger
 
 from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact
-from pipeline.artifacts.publishing import published
 from pipeline.artifacts.sharding import is_current, shard_entry
-from pipeline.asking.cache import write_rows
+from pipeline.asking.cache import publish_rows
 from pipeline.asking.label_rows import grasp_part
 from pipeline.config import RunConfig
 from pipeline.errors import SceneError
@@ -38,7 +37,6 @@ from pipeline.stopwatch import Stopwatch
 from pipeline.world.raycasting import RayScene
 from pipeline.world.scene import ClutterScene
 from schemas.softgrip.v1.grasps_pb2 import ShardEntry
-from schemas.tables import BY_NAME
 
 
 @dataclass(frozen=True)
@@ -159,8 +157,8 @@ def examined(job: ShardJob) -> ShardResult:
             with writing.running():
                 rows.append(grasp_part(origin, grasps, first))
             first += len(grasps)
-    with writing.running(), published(job.rows) as scratch:
-        write_rows(scratch, BY_NAME["grasps"], iter(rows))
+    with writing.running():
+        publish_rows(job.rows, "grasps", rows)
     # A shard of a scene that was left out holds no grasp to tell the split.
     split = split or LabelledWorld(job).scene.split
     entry = shard_entry(job.shard, job.shard.parent.parent, int(histogram.sum()), split)

@@ -67,6 +67,31 @@ def published(path: Path) -> Iterator[Path]:
         scratch.unlink(missing_ok=True)
 
 
+@contextmanager
+def published_folder(path: Path) -> Iterator[Path]:
+    """Fill a folder under another name beside it, which becomes ``path`` when the block succeeds.
+
+    On any failure, an interrupt too, the scratch folder is removed.
+
+    Parameters
+    ----------
+    path
+        The folder; it does not exist, and the one that it lies in does.
+
+    Yields
+    ------
+    Path
+        The scratch folder to fill.
+    """
+    scratch = scratch_beside(path)
+    try:
+        scratch.mkdir()
+        yield scratch
+        scratch.rename(path)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+
+
 def scratch_beside(path: Path) -> Path:
     """A new hidden name beside ``path`` for a scratch file; it holds this machine and process."""
     ending = f".{this_process()}-{secrets.token_hex(4)}{SCRATCH_SUFFIX}"

@@ -8,7 +8,7 @@ the last whole state. `make prune` frees the files.
 
 import hashlib
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Self
@@ -18,7 +18,7 @@ import pyarrow as pa
 from filelock import FileLock
 
 from pipeline.artifacts.digests import content_digests
-from pipeline.artifacts.publishing import published, scratch_beside
+from pipeline.artifacts.publishing import published, published_folder
 from pipeline.asking.columns import NONE, Part, Values, Words
 from pipeline.errors import ArtifactError
 from schemas.tables import BY_NAME, TEXT, Column, Table
@@ -56,8 +56,9 @@ def arrow_table(name: str, artifact: Path, cache: Path) -> pa.Table:
             # What reads messages takes seconds to load, and most questions find their tables made.
             from pipeline.asking.rows import ROWS
 
-            with _made_whole(folder, name) as scratch, published(_part(scratch, 0)) as file:
-                write_rows(file, BY_NAME[name], ROWS[name](artifact))
+            with published_folder(folder) as scratch:
+                publish_rows(_part(scratch, 0), name, ROWS[name](artifact))
+            _remove_former(folder, name)
         parts = sorted(folder.iterdir())
     return pa.concat_tables([pa.ipc.open_file(pa.memory_map(str(p))).read_all() for p in parts])
 
@@ -74,14 +75,15 @@ def keep_rows(name: str, artifact: Path, cache: Path, files: Sequence[Path]) -> 
     cache
         Folder of the tables, on the same disk as the files; tables of former artifacts are removed.
     files
-        Arrow files of its rows in order, by `RowsFile`; they are moved.
+        Arrow files of its rows in order, by `publish_rows`; they are moved.
     """
     with _held(name, cache):
         folder = _folder_of(name, artifact, cache)
         if not folder.is_dir():
-            with _made_whole(folder, name) as scratch:
+            with published_folder(folder) as scratch:
                 for number, file in enumerate(files):
                     file.rename(_part(scratch, number))
+            _remove_former(folder, name)
 
 
 @contextmanager
@@ -92,21 +94,13 @@ def _held(name: str, cache: Path) -> Iterator[None]:
         yield
 
 
-@contextmanager
-def _made_whole(folder: Path, name: str) -> Iterator[Path]:
-    """A scratch folder that becomes the table's; its former folders are removed."""
-    scratch = scratch_beside(folder)
-    try:
-        scratch.mkdir()
-        yield scratch
-        scratch.rename(folder)
-        for older in folder.parent.glob(f"{name}-*"):
-            if older.is_file():  # of a version that kept a table in one file
-                older.unlink()
-            elif older != folder:
-                shutil.rmtree(older)
-    finally:  # whatever happens, an interrupt included
-        shutil.rmtree(scratch, ignore_errors=True)
+def _remove_former(folder: Path, name: str) -> None:
+    """Remove a table of former artifacts."""
+    for older in folder.parent.glob(f"{name}-*"):
+        if older.is_file():  # of a version that kept a table in one file
+            older.unlink()
+        elif older != folder:
+            shutil.rmtree(older)
 
 
 def _part(folder: Path, number: int) -> Path:
@@ -121,15 +115,15 @@ def _folder_of(name: str, artifact: Path, cache: Path) -> Path:
     return cache / f"{name}-{digest[:DIGITS]}-{version}"
 
 
-def write_rows(path: Path, table: Table, parts: Iterator[Part]) -> None:
-    """Write the rows of a table as an Arrow file, many parts at a time.
+def publish_rows(path: Path, name: str, parts: Iterable[Part]) -> None:
+    """Write the rows of a table as an Arrow file, whole or not at all, many parts at a time.
 
     Parameters
     ----------
     path
         The file.
-    table
-        Its columns.
+    name
+        Of the table.
     parts
         Their values; a column that is missing is NULL in every row.
 
@@ -138,7 +132,7 @@ def write_rows(path: Path, table: Table, parts: Iterator[Part]) -> None:
     ArtifactError
         A part has a column that the table lacks.
     """
-    with RowsFile(path, table) as rows:
+    with published(path) as scratch, RowsFile(scratch, BY_NAME[name]) as rows:
         for part in parts:
             rows.add(part)
 

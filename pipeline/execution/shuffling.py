@@ -12,9 +12,8 @@ import numpy as np
 from jaxtyping import Int
 
 from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact
-from pipeline.artifacts.publishing import published
 from pipeline.artifacts.sharding import is_current, shard_entry
-from pipeline.asking.cache import write_rows
+from pipeline.asking.cache import publish_rows
 from pipeline.asking.label_rows import sample_part
 from pipeline.config import RunConfig
 from pipeline.execution.shuffle_plan import Part, Source, drawn, order_within
@@ -25,7 +24,6 @@ from pipeline.network.samples import Samples
 from pipeline.network.shuffling import near_equal_sizes, placed, positions_by_part, positions_in
 from pipeline.stopwatch import Stopwatch
 from schemas.softgrip.v1.grasps_pb2 import ShardEntry
-from schemas.tables import BY_NAME
 
 
 @dataclass(frozen=True)
@@ -121,8 +119,8 @@ def counted(job: GatherJob, batches: Iterable[Samples]) -> Gathered:
         with writing.running():
             rows.append(sample_part(batch, job.names, split, first))
         first += len(batch)
-    with writing.running(), published(job.rows) as scratch:
-        write_rows(scratch, BY_NAME["samples"], iter(rows))
+    with writing.running():
+        publish_rows(job.rows, "samples", rows)
     entries = [shard_entry(path, job.below, size, split) for path, _, size in pieces_of(job)]
     return Gathered(entries, quality, seen, cells, writing.seconds)
 

@@ -18,7 +18,7 @@ import numpy as np
 from filelock import FileLock
 from jaxtyping import Int
 
-from pipeline.artifacts.publishing import scratch_beside
+from pipeline.artifacts.publishing import published_folder, scratch_beside
 from pipeline.artifacts.reading import open_artifact
 from pipeline.artifacts.sharding import listed_shards, read_index
 from pipeline.errors import ArtifactError, ConfigError
@@ -206,14 +206,9 @@ class BoundedSamples:
             for whole in self._cache.glob(f"{self._split}-*"):
                 shutil.rmtree(whole)
             self._free(self.limit_bytes - shard.samples * self.sample_bytes)
-            scratch = scratch_beside(shard.folder)
-            try:
-                scratch.mkdir()
-                entry = ShardEntry(sha256=shard.sha256, samples=shard.samples)
+            entry = ShardEntry(sha256=shard.sha256, samples=shard.samples)
+            with published_folder(shard.folder) as scratch:
                 decode_shards({shard.path: entry}, scratch)
-                scratch.rename(shard.folder)
-            finally:  # whatever happens, an interrupt of the first call included
-                shutil.rmtree(scratch, ignore_errors=True)
 
     def _free(self, most_bytes: int) -> None:
         """Remove decoded shards, those used longest ago first, until the rest is no larger."""

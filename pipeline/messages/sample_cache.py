@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from filelock import FileLock
 
-from pipeline.artifacts.publishing import file_sha256, scratch_beside, write_error
+from pipeline.artifacts.publishing import file_sha256, published_folder, write_error
 from pipeline.artifacts.reading import open_artifact
 from pipeline.artifacts.sharding import listed_shards, read_index
 from pipeline.errors import ArtifactError
@@ -51,23 +51,18 @@ def cached_split(index: Path, split: str, cache: Path) -> Samples:
     ArtifactError
         a shard is missing, damaged, or not the one that the index names; or the split is empty.
     """
-    entries = [entry for entry in read_index(index).shards if entry.split == split]
+    entries = _entries(index, split)
     folder = cache / f"{split}-{cache_key(entries)}"
     cache.mkdir(parents=True, exist_ok=True)
     with FileLock(cache / f"{split}.lock"):
         if not folder.is_dir():
-            shards = dict(zip(listed_shards(index, [split]), entries, strict=True))
-            for left in cache.glob(f".{split}.*part"):  # of one killed: this one holds the lock
+            shards = _files(index, split, entries)
+            for left in cache.glob(f".{split}*part"):  # of one killed: this one holds the lock
                 shutil.rmtree(left, ignore_errors=True)
-            scratch = scratch_beside(cache / split)
-            try:
-                scratch.mkdir()
+            with published_folder(folder) as scratch:
                 decode_shards(shards, scratch)
                 for older in cache.glob(f"{split}-*"):
                     shutil.rmtree(older)
-                scratch.rename(folder)
-            finally:  # whatever happens, an interrupt of the first call included
-                shutil.rmtree(scratch, ignore_errors=True)
     return mapped_samples(folder)
 
 
@@ -91,8 +86,7 @@ def read_parts(index: Path, split: str) -> Iterator[Samples]:
     ArtifactError
         A shard is missing, damaged, or not the one that the index names.
     """
-    entries = [entry for entry in read_index(index).shards if entry.split == split]
-    yield from _parts(dict(zip(listed_shards(index, [split]), entries, strict=True)))
+    yield from _parts(_files(index, split, _entries(index, split)))
 
 
 def first_samples(index: Path, split: str, wanted: int) -> Samples:
@@ -124,7 +118,7 @@ def first_samples(index: Path, split: str, wanted: int) -> Samples:
         if found == wanted:
             break
     if not found:
-        raise ArtifactError("a split holds no samples", "Ask for more grasps or objects.")
+        raise _empty_split()
     return join_samples(parts)
 
 
@@ -160,7 +154,7 @@ def decode_shards(shards: dict[Path, ShardEntry], into: Path) -> None:
             arrays[name][filled : filled + len(part)] = found
         filled += len(part)
     if not filled:
-        raise ArtifactError("a split holds no samples", "Ask for more grasps or objects.")
+        raise _empty_split()
     for array in arrays.values():
         array.flush()
 
@@ -190,6 +184,20 @@ def mapped_samples(folder: Path) -> Samples:
     arrays = {name: np.load(folder / f"{name}.npy", mmap_mode="c") for name in STORED_AS}
     arrays["cloud_mask"] = arrays["cloud_mask"].view(bool)
     return Samples(**arrays)
+
+
+def _entries(index: Path, split: str) -> list[ShardEntry]:
+    """What the index says of the shards of a split."""
+    return [entry for entry in read_index(index).shards if entry.split == split]
+
+
+def _files(index: Path, split: str, entries: list[ShardEntry]) -> dict[Path, ShardEntry]:
+    """The shards of a split, all of them there, beside what the index says of each."""
+    return dict(zip(listed_shards(index, [split]), entries, strict=True))
+
+
+def _empty_split() -> ArtifactError:
+    return ArtifactError("a split holds no samples", "Ask for more grasps or objects.")
 
 
 def _parts(shards: dict[Path, ShardEntry]) -> Iterator[Samples]:

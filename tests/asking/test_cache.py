@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from pipeline.asking import cache as tables
-from pipeline.asking.cache import arrow_table, write_rows
+from pipeline.asking.cache import arrow_table, publish_rows
 from pipeline.asking.columns import Part, Words
 from pipeline.asking.rows import ROWS
 from pipeline.errors import ArtifactError
-from schemas.tables import BY_NAME
 
 
 def parts() -> list[Part]:
@@ -39,4 +38,4 @@ def test_rows_are_the_same_however_many_stand_in_a_batch(
 
 def test_a_column_that_the_table_lacks_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ArtifactError, match="Table samples has no"):
-        write_rows(tmp_path / "a.arrow", BY_NAME["samples"], iter([{"mass": np.ones(1)}]))
+        publish_rows(tmp_path / "a.arrow", "samples", [{"mass": np.ones(1)}])

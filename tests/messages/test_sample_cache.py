@@ -97,7 +97,7 @@ def test_an_interrupt_leaves_nothing_half(
 
     def interrupted(path: Path, *args: Path, **options: bool) -> None:
         really(path, *args, **options)
-        if path.name.startswith(".train.") and path.suffix == ".part":
+        if path.name.startswith(".train-") and path.suffix == ".part":
             raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:

@@ -23,13 +23,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from pipeline.gripper.compiled import compiled_finite
-from pipeline.gripper.problem import GraspStatus
-from pipeline.gripper.solvers.interior_point import (
-    FEASIBILITY_TOLERANCE,
-)
+from pipeline.gripper.solvers.interior_point import FEASIBILITY_TOLERANCE, INFEASIBLE, SOLVED
 
-SOLVED = int(GraspStatus.SOLVED)
-INFEASIBLE = int(GraspStatus.INFEASIBLE)
 # What a problem is marked with that is not decided yet; no status of a grasp.
 SIFTED = -1
 UNDECIDED = -2
@@ -458,6 +453,7 @@ def _gram(
     system[4, 2], system[4, 3], system[4, 4] = unit * s_42, unit * s_43, s_44
 
 
+# As in `interior_point`: a compiled function may call none of another module.
 @compiled_finite
 def _factor(system: Float[np.ndarray, "5 5"]) -> None:
     """Cholesky factor in place; a pivot lost to rounding stops its row from moving."""
