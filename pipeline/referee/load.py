@@ -10,6 +10,7 @@ hundred wrenches, by SciPy's HiGHS, and one load is checked by non-negative leas
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -21,6 +22,47 @@ FRICTION_SIDES = 12  # of the pyramid in Coulomb's cone: 3.4 % less at most
 BALANCED = 1e-6  # of the largest force in play
 OPTIMAL, INFEASIBLE, UNBOUNDED = 0, 2, 3  # what linprog says
 MOST, HALVINGS = 1e6, 40  # a scale over this is without end; a millionth of a millionth of it
+
+
+class Balancing:
+    """Finds pushes ≥ 0 that balance one load after another.
+
+    The few columns that balanced the last load are tried first: while an object is carried, its
+    load changes little from step to step, and the same columns balance it.
+    """
+
+    def __init__(self, columns: Float[np.ndarray, "r m"]) -> None:
+        """Store the wrenches of unit pushes, a column each, shape (r, m)."""
+        self._columns = columns
+        self._last: tuple[Float[np.ndarray, "r k"], Float[np.ndarray, "k r"]] | None = None
+
+    def balances(self, wanted: Float[np.ndarray, " r"], within: float) -> bool:
+        """Whether some pushes sum up to a wrench.
+
+        Parameters
+        ----------
+        wanted
+            What the columns must sum up to, shape (r,).
+        within
+            How far the sum may stay off it, as a norm.
+
+        Returns
+        -------
+        True where they do; the last columns alone never say no.
+        """
+        if self._last is not None:
+            columns, inverse = self._last
+            pushes = inverse @ wanted
+            if pushes.min() >= 0.0 and np.linalg.norm(columns @ pushes - wanted) <= within:
+                return True
+        if not self._columns.shape[1]:  # SciPy's nnls ends the process on such a matrix
+            return bool(np.linalg.norm(wanted) <= within)
+        pushes, residual = nnls(self._columns, wanted)
+        used = np.flatnonzero(pushes)
+        if residual <= within and len(used):
+            columns = self._columns[:, used]
+            self._last = columns, np.linalg.pinv(columns)
+        return bool(residual <= within)
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,15 +100,10 @@ class Hold:
         True where contact and friction can balance it.
         """
         wanted = self._scaled(-(load + self.suction))
-        columns = self._scaled(self.contact)
         if np.isfinite(self.most_n):  # pushes and what is left of them make up the most
-            left = np.append(np.ones(columns.shape[1]), 1.0)
-            columns = np.vstack([np.column_stack([columns, np.zeros(6)]), left])
             wanted = np.append(wanted, self.most_n + max(float(load[2]), 0.0))
-        # SciPy's nnls ends the process on a matrix without columns.
-        residual = nnls(columns, wanted)[1] if columns.shape[1] else np.linalg.norm(wanted)
-        largest = max(float(np.abs(self._scaled(self.suction)).max()), float(np.abs(wanted).max()))
-        return bool(residual <= BALANCED * largest)
+        largest = max(self._largest_suction, float(np.abs(wanted).max()))
+        return self._balancing.balances(wanted, BALANCED * largest)
 
     def largest_scale(self, load: Float[np.ndarray, " 6"]) -> float:
         """The largest t for which t times the load is borne.
@@ -113,6 +150,18 @@ class Hold:
             if not (np.isfinite(least) and self.bears(least * load)):
                 least = min(least, self.largest_scale(load))
         return float(least)
+
+    @cached_property
+    def _balancing(self) -> Balancing:
+        columns = self._scaled(self.contact)
+        if np.isfinite(self.most_n):
+            left = np.append(np.ones(columns.shape[1]), 1.0)
+            columns = np.vstack([np.column_stack([columns, np.zeros(6)]), left])
+        return Balancing(columns)
+
+    @cached_property
+    def _largest_suction(self) -> float:
+        return float(np.abs(self._scaled(self.suction)).max())
 
     def _scale_by_halving(self, load: Float[np.ndarray, " 6"]) -> float:
         """The same by checking loads, where the linear program meets numerical difficulties."""

@@ -395,9 +395,11 @@ class SuctionGripper:
     def _push_on_rigid_parts(self) -> Float[np.ndarray, " 6"] | None:
         """Contact force [N], moment about the pad's centre [N m], in WCS; None without."""
         total, centre = None, self.pose()[:3, 3]
+        owns = self._mover.owns
         for contact in self._world.get_contacts():
-            first, second = (self._mover.owns(body.entity) for body in contact.bodies)
-            if first == second:
+            one, other = contact.bodies
+            first = owns(one.entity)
+            if first == owns(other.entity):
                 continue
             total = np.zeros(6) if total is None else total
             sign = 1.0 if first else -1.0

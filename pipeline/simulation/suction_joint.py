@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 
 from pipeline.geometry.catalogue import CatalogueObject
-from pipeline.geometry.compiled_poses import pose_of, turn_between
+from pipeline.geometry.compiled_poses import cross_product, pose_of, turn_between
 from pipeline.geometry.transforms import invert
 from pipeline.physics.engine import Body, roll_freely
 from pipeline.simulation.judges import Bearing
@@ -106,9 +106,8 @@ class SuctionJoint:
         # the lever is that of the object where it was sealed.
         arm = wanted[:3, 3] - world_from_gripper[:3, 3]
         into_gripper = world_from_gripper[:3, :3].T
-        load = -np.concatenate(
-            [into_gripper @ force, into_gripper @ (torque + np.cross(arm, force))]
-        )
+        moment = torque + cross_product(arm, force)
+        load = -np.concatenate([into_gripper @ force, into_gripper @ moment])
         if not self.limits.bears(load):
             return load, False
         self.body.rigid.add_force_torque(force, torque)

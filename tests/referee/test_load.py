@@ -1,5 +1,7 @@
 """Loads against levers, Coulomb's law and Clarabel's exact cones."""
 
+from dataclasses import replace
+
 import clarabel
 import numpy as np
 import pytest
@@ -60,6 +62,22 @@ def test_without_contact_only_a_central_pull_is_borne() -> None:
     hold = flat_hold(np.zeros(COUNT, dtype=bool))
     assert hold.bears(np.array([0.0, 0.0, -FORCE_N, 0.0, 0.0, 0.0]))
     assert not hold.bears(np.array([0.0, 0.0, -0.9 * FORCE_N, 0.0, 0.0, 0.0]))
+
+
+@settings(max_examples=30)
+@given(
+    arrays.arrays(float, (12, 6), elements=st.floats(-1.0, 1.0)),
+    st.floats(0.0, 60.0),
+    st.sampled_from([np.inf, FORCE_N]),
+)
+def test_what_balanced_the_last_load_changes_no_verdict(
+    steps: np.ndarray, pull_n: float, most_n: float
+) -> None:
+    """One hold is asked load after load, as while it carries; a new one is asked each by itself."""
+    asked = replace(flat_hold(), most_n=most_n)
+    unit = np.array([3.0, 3.0, 3.0, 0.1, 0.1, 0.1])
+    for load in np.cumsum(steps * unit, axis=0) - pull_n * np.eye(6)[2]:
+        assert asked.bears(load) == replace(asked).bears(load)
 
 
 def test_a_side_force_is_rubbed_against() -> None:
