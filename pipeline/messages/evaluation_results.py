@@ -1,7 +1,7 @@
 """What the attempts of an evaluation come to: by level, by policy, and policy against policy."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,6 +70,33 @@ class Results:
                 for c in self.comparisons
             },
         }
+
+
+# Nearly all bytes of an attempt: what recordings show and training can use, and no figure needs.
+_FILM = (
+    "time_s",
+    "gripper_path",
+    "object_paths",
+    "base_wrench",
+    "states",
+    "joint_path",
+    "pressure",
+    "candidate_poses",
+    "candidate_quality",
+    "pictures",
+    "seen",
+    "contacts",
+)
+
+
+def without_film(attempts: Iterable[Attempt]) -> list[Attempt]:
+    """Attempts without their paths, pictures and clouds: a few hundred bytes each in memory."""
+    bare = []
+    for made in attempts:
+        for name in _FILM:
+            made.ClearField(name)
+        bare.append(made)
+    return bare
 
 
 def results_of(

@@ -109,7 +109,8 @@ def read_scene(path: Path, index: int) -> ClutterScene:
     """Scene ``index`` with its images."""
     with open_artifact(path) as artifact:
         message, time_ns = _message(artifact, index)
-        return _scene(artifact, message, time_ns)
+        views = tuple(_view(artifact, viewpoint, time_ns) for viewpoint in message.viewpoints)
+        return _scene(message, views)
 
 
 def read_groups(path: Path) -> list[tuple[str, int]]:
@@ -174,6 +175,12 @@ def read_scenes(path: Path) -> Iterator[ClutterScene]:
         yield read_scene(path, index)
 
 
+def read_unseen_scenes(path: Path) -> list[ClutterScene]:
+    """All scenes, in order, without what cameras saw of them: `views` is empty."""
+    with open_artifact(path) as artifact:
+        return [_scene(message, ()) for _, message in artifact.messages(scenes_pb2.Scene)]
+
+
 def _message(artifact: Artifact, index: int) -> tuple[scenes_pb2.Scene, int]:
     """Scene ``index`` and its time [ns]. Raises ArtifactError where there is none."""
     for time_ns, message in artifact.messages(scenes_pb2.Scene, at_ns=index * NS_PER_SCENE):
@@ -181,7 +188,7 @@ def _message(artifact: Artifact, index: int) -> tuple[scenes_pb2.Scene, int]:
     raise ArtifactError(f"{artifact.path} holds no scene {index}", "Make the scenes again")
 
 
-def _scene(artifact: Artifact, message: scenes_pb2.Scene, time_ns: int) -> ClutterScene:
+def _scene(message: scenes_pb2.Scene, views: tuple[CameraView, ...]) -> ClutterScene:
     contacts = from_tensor(message.contacts)
     return ClutterScene(
         scene_id=file_name(message.scene_id),
@@ -194,7 +201,7 @@ def _scene(artifact: Artifact, message: scenes_pb2.Scene, time_ns: int) -> Clutt
         settle_time_s=message.settle_time_s,
         key=message.key,
         generator=message.generator,
-        views=tuple(_view(artifact, viewpoint, time_ns) for viewpoint in message.viewpoints),
+        views=views,
     )
 
 

@@ -17,7 +17,7 @@ from pipeline.config.grasps import PadConfig
 from pipeline.geometry.mesh import Mesh
 from pipeline.messages.objects import read_objects
 from pipeline.messages.proposed_contacts import worst_by_object
-from pipeline.messages.scenes import read_scenes
+from pipeline.messages.scenes import read_placements
 from pipeline.recording import colours
 from pipeline.recording.pads import SealedPad, sealed_pad, show_pad, show_rings
 from pipeline.recording.proposed_contacts import (
@@ -63,9 +63,8 @@ def draw_evaluate(stage: FinishedStage, figures: Mapping[str, Any]) -> None:
         name: item.mesh for name, (item, _) in read_objects(stage.upstream("objects")).items()
     }
     names = {
-        scene.scene_id: [placed.object_name for placed in scene.objects]
-        for scene in read_scenes(stage.upstream("scenes"))
-        if scene.split == stage.config.evaluate.split
+        scene_id: [placed.object_name for placed in objects]
+        for scene_id, objects in read_placements(stage.upstream("scenes")).items()
     }
     with open_artifact(stage.output) as artifact:
         attempts = [message for _, message in artifact.messages(Attempt)]

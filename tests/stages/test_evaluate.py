@@ -14,13 +14,14 @@ from pipeline.execution import RunFolder
 from pipeline.execution.staleness import stage_context
 from pipeline.labelling.poses import label_poses
 from pipeline.labelling.scene import scene_surfaces
+from pipeline.messages.evaluation_results import results_of, without_film
 from pipeline.messages.objects import read_objects
 from pipeline.messages.samples import read_split
-from pipeline.messages.scenes import read_scenes
+from pipeline.messages.scenes import read_scenes, read_unseen_scenes
 from pipeline.messages.trained import rates_for
 from pipeline.network.sources import baseline_from_json
 from pipeline.simulation.proposed_contacts import propose_contacts
-from schemas.softgrip.v1.evaluation_pb2 import ProposedContacts
+from schemas.softgrip.v1.evaluation_pb2 import Attempt, ProposedContacts
 from stages.evaluate import clutters
 from stages.graph import EVALUATE, GIVEN_NETWORK, inputs_of
 
@@ -142,3 +143,23 @@ def test_without_noise_both_predictions_of_the_network_are_one(run: RunFolder) -
         found = propose_contacts(scene, meshes, analytic, analytic, chosen, rng)
         seen, without = (found.predicted[name] for name in ("network", "network, without noise"))
         assert np.array_equal(seen, without) is same
+
+
+def test_jobs_carry_no_pictures_and_figures_need_no_film(run: RunFolder) -> None:
+    """What a cluster is sent and what the driver holds stay small, and nothing else changes."""
+    for unseen, scene in zip(
+        read_unseen_scenes(run.artifact("scenes")), read_scenes(run.artifact("scenes")), strict=True
+    ):
+        assert scene.views
+        assert unseen.views == ()
+        for name in vars(replace(scene, views=())):
+            if name not in ("views", "objects"):
+                np.testing.assert_array_equal(getattr(unseen, name), getattr(scene, name))
+    with open_artifact(run.artifact("evaluate")) as artifact:
+        whole = [message for _, message in artifact.messages(Attempt)]
+        bare = without_film(message for _, message in artifact.messages(Attempt))
+    policies = load_run_config(run.config).evaluate.policies
+    scenes = read_unseen_scenes(run.artifact("scenes"))
+    told = [results_of(scenes, policies, made, (1.0, 3.0)).summary() for made in (whole, bare)]
+    assert told[0] == told[1]
+    assert sum(m.ByteSize() for m in bare) < sum(m.ByteSize() for m in whole) / 10
