@@ -19,7 +19,7 @@ from pipeline.control.clearance import free_of_collision
 from pipeline.control.viewpoints import back_off
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.mesh import Mesh
-from pipeline.geometry.transforms import rotate_vectors, transform_points
+from pipeline.geometry.transforms import invert, rotate_vectors, transform_points
 from pipeline.gripper.pad import Pad
 from pipeline.labelling.heights import pad_heights
 from pipeline.labelling.sampling import (
@@ -113,6 +113,8 @@ class Ceilings:
 
         What was found before stays where neither the object nor a body near it moved; and where
         bodies near it are gone and it could be lifted already, so that it bears at least that much.
+        With ``ceiling.first_that_lifts``, a pose that lifted the object before is tried first,
+        moved with it.
 
         Parameters
         ----------
@@ -128,7 +130,8 @@ class Ceilings:
         for body in sorted(poses):
             near, before = self._near(body, poses), self._found.get(body)
             if before is None or self._may_differ(body, before, near):
-                self._found[body] = near, self._look(body, poses, surfaces)
+                again = self._try_again(body, before, poses, surfaces) if before else None
+                self._found[body] = near, again or self._look(body, poses, surfaces)
         return {body: self._found[body][1] for body in poses}
 
     def _near(self, body: int, poses: Mapping[int, Pose]) -> dict[int, Pose]:
@@ -149,15 +152,37 @@ class Ceilings:
             return True
         return len(near) < len(then) and not best.lifts
 
+    def _try_again(
+        self,
+        body: int,
+        before: tuple[dict[int, Pose], Best],
+        poses: Mapping[int, Pose],
+        surfaces: PosedScene,
+    ) -> Best | None:
+        """The pose that lifted the object before, moved with it; None where it does no longer."""
+        then, best = before
+        if not (self._config.evaluate.ceiling.first_that_lifts and best.lifts):
+            return None
+        frame = poses[body] @ invert(then[body]) @ best.world_from_gripper
+        one = Candidates(frame[None], np.array([body]), np.zeros(1), np.zeros(1, dtype=np.int64))
+        one = self._reached(one, surfaces, self._obstacles_m(poses))
+        borne_n = self._borne_n(one, poses[body], surfaces, best.weight_n)
+        if not (borne_n >= best.weight_n).any():
+            return None
+        return Best(float(borne_n[0]), best.weight_n, one.world_from_contact[0], best.reached)
+
+    def _obstacles_m(self, poses: Mapping[int, Pose]) -> Float[np.ndarray, "n 3"]:
+        """Points of all bodies' surfaces, that hand and stem keep clear of, in WCS [m]."""
+        return np.concatenate(
+            [transform_points(poses[i], _points_of(self._items[i].mesh)[0]) for i in sorted(poses)]
+        )
+
     def _look(self, body: int, poses: Mapping[int, Pose], surfaces: PosedScene) -> Best:
         """Draw, sift, judge; where none of these lifts the object, judge again near the best."""
         weight_n = GRAVITY_M_S2 * self._items[body].mass_kg
         wanted, rng = self._config.evaluate.ceiling, np.random.default_rng([self._seed, body])
         surface = upward_surface(self._items[body].mesh, poses[body], body)
-        stands = [
-            transform_points(poses[i], _points_of(self._items[i].mesh)[0]) for i in sorted(poses)
-        ]
-        obstacles_m = np.concatenate(stands)
+        obstacles_m = self._obstacles_m(poses)
         drawn: list[Candidates] = []
         while len(surface.points_m) and len(drawn) < _DRAWS and _count(drawn) < wanted.poses:
             some = propose(surface, wanted.poses, _from_all_sides(self._config.grasps), rng)

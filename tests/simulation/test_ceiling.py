@@ -18,6 +18,9 @@ from pipeline.world.posed_bodies import PosedBodies
 from tests.bodies import catalogue_object, mesh_of, pose_at
 
 CONFIG = RunConfig(evaluate=EvaluateConfig(ceiling=CeilingConfig(poses=60, judged=6)))
+FIRST = RunConfig(
+    evaluate=EvaluateConfig(ceiling=CeilingConfig(poses=60, judged=6, first_that_lifts=True))
+)
 PAD = build_pad(CONFIG.gripper.pad)
 JUDGE = LabelJudge(CONFIG, PAD)  # quick; what is looked for is the same with either
 BAR = trimesh.creation.box(extents=(0.16, 0.06, 0.04))
@@ -75,15 +78,28 @@ def test_what_is_too_heavy_for_a_full_seal_cannot_be_lifted(heavy: CatalogueObje
 def test_the_search_may_end_at_the_first_pose_that_lifts(
     bar: CatalogueObject, heavy: CatalogueObject
 ) -> None:
-    ceiling = CONFIG.evaluate.ceiling.model_copy(update={"first_that_lifts": True})
-    evaluate = CONFIG.evaluate.model_copy(update={"ceiling": ceiling})
-    config = CONFIG.model_copy(update={"evaluate": evaluate})
-    first, best = (found(ceilings(bar, config=c), LIES)[1] for c in (config, CONFIG))
+    first, best = (found(ceilings(bar, config=c), LIES)[1] for c in (FIRST, CONFIG))
     assert first.lifts
     assert first.borne_n <= best.borne_n
     # What no pose lifts is looked for to the end.
-    first, best = (found(ceilings(heavy, config=c), LIES)[1] for c in (config, CONFIG))
+    first, best = (found(ceilings(heavy, config=c), LIES)[1] for c in (FIRST, CONFIG))
     assert first.borne_n == best.borne_n
+
+
+def test_a_pose_that_lifted_goes_with_the_object(bar: CatalogueObject) -> None:
+    looked, beside = ceilings(bar, bar, config=FIRST), pose_at(0, 0.08, 0.02)
+    first = found(looked, LIES, beside)[1]
+    moved = pose_at(0.03, -0.01, 0.02)
+    moved[:3, :3] = Rotation.from_euler("z", 20, degrees=True).as_matrix()
+    after = found(looked, moved, beside)[1]
+    assert after.lifts
+    np.testing.assert_allclose(
+        after.world_from_gripper, moved @ np.linalg.inv(LIES) @ first.world_from_gripper, atol=1e-4
+    )
+    # Under a lid that pose is gone, and no other is found.
+    lid = moved.copy()
+    lid[2, 3] = 0.0601
+    assert found(looked, moved, lid)[1].borne_n < 0.2 * first.borne_n
 
 
 def test_out_of_reach_nothing_is_borne(bar: CatalogueObject) -> None:
