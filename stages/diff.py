@@ -3,6 +3,7 @@
 In ``runs/<A>/diff-<B>``: diff.md, diff.html, diff.rrd, diff.summary.json.
 """
 
+import hashlib
 import json
 import os
 import sys
@@ -153,12 +154,20 @@ def draw(a: Side, b: Side, facts: dict[str, Any], text: str, into: Path) -> None
         words[one.group] = f"**{one.group}**: distance {one.distance:.4f}, {said}"
     errors = ([row[1] for row in facts["by_object"]], [row[2] for row in facts["by_object"]])
     rates = tuple([row.rates[side] for row in facts["success"]] for side in (0, 1))
-    keys = "".join(read_provenance(side.folder.artifact("objects")).key for side in (a, b))
-    recorded = OwnRecording(NAME, into / "diff.rrd", keys)
+    recorded = OwnRecording(NAME, into / "diff.rrd", identity(a, b))
     there = {"labels": histograms, "error": errors[0], "success": rates[0]}
     shown = [quantity for quantity, values in there.items() if values]
     with recording(recorded, blueprint([s.folder.path.name for s in (a, b)], shown)) as stream:
         show_diff(stream, histograms, words, errors, (rates[0], rates[1]), text)
+
+
+def identity(a: Side, b: Side) -> str:
+    """What the viewer knows a comparison by: another one of the same objects opens beside it."""
+    runs = []
+    for side in (a, b):
+        made = [path for name in STAGES if (path := side.folder.artifact(name)).is_file()]
+        runs.append([str(side.folder.path), *(read_provenance(path).key for path in made)])
+    return hashlib.sha256(json.dumps(runs).encode()).hexdigest()
 
 
 if __name__ == "__main__":

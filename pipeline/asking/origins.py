@@ -1,6 +1,6 @@
 """What the artifacts of a run were made from, as a table: no row of it lies in a message."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import pyarrow as pa
@@ -12,7 +12,9 @@ from pipeline.asking.columns import words
 from schemas.tables import INPUTS
 
 
-def inputs_table(artifacts: Mapping[str, Path], cache: Path) -> pa.Table:
+def inputs_table(
+    artifacts: Mapping[str, Path], cache: Path, makers: Sequence[str] | None = None
+) -> pa.Table:
     """Every file that a stage read, and what lies there now where it is an artifact of the run.
 
     Parameters
@@ -21,6 +23,8 @@ def inputs_table(artifacts: Mapping[str, Path], cache: Path) -> pa.Table:
         Stage → its artifact, of the stages that are made.
     cache
         Folder of the tables' Arrow files, in the run's state: digests are remembered beside it.
+    makers
+        The stages whose rows are asked for; None: all.
 
     Returns
     -------
@@ -33,7 +37,11 @@ def inputs_table(artifacts: Mapping[str, Path], cache: Path) -> pa.Table:
     """
     read = [
         (stage, record, used)
-        for stage, record in ((s, read_provenance(path)) for s, path in artifacts.items())
+        for stage, record in (
+            (s, read_provenance(path))
+            for s, path in artifacts.items()
+            if makers is None or s in makers
+        )
         for used in record.inputs
     ]
     named = {used.path for _, _, used in read}

@@ -2,17 +2,16 @@
 
 import difflib
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 import duckdb
 import pyarrow as pa
 
-from pipeline.asking.cache import arrow_table
-from pipeline.asking.origins import inputs_table
+from pipeline.asking.tables import mentioned, table_rows
 from pipeline.errors import QueryError
-from schemas.tables import BY_NAME, TABLES
+from schemas.tables import BY_NAME
 
 
 def ask(sql: str, artifacts: Mapping[str, Path], cache: Path) -> pa.Table:
@@ -44,25 +43,27 @@ class OpenTables:
     """The tables of a run, of which those that a question names are opened, once."""
 
     def __init__(
-        self, connection: duckdb.DuckDBPyConnection, artifacts: Mapping[str, Path], cache: Path
+        self,
+        connection: duckdb.DuckDBPyConnection,
+        artifacts: Mapping[str, Path],
+        cache: Path,
+        makers: Sequence[str] | None,
     ) -> None:
         self._connection = connection
         self._artifacts = artifacts
         self._cache = cache
+        self._makers = makers
         self._opened: set[str] = set()
 
     def ask(self, sql: str) -> pa.Table:
         """Answer a question; as `ask`."""
         for name in mentioned(sql):
-            stage = BY_NAME[name].stage
-            if name in self._opened or (stage and stage not in self._artifacts):
+            if name in self._opened:
                 continue
-            if stage:
-                rows = arrow_table(name, self._artifacts[stage], self._cache)
-            else:
-                rows = inputs_table(self._artifacts, self._cache)
-            self._connection.register(name, rows)
-            self._opened.add(name)
+            rows = table_rows(name, self._artifacts, self._cache, self._makers)
+            if rows is not None:
+                self._connection.register(name, rows)
+                self._opened.add(name)
         try:
             relation = self._connection.sql(sql)
             if relation is None:
@@ -74,7 +75,10 @@ class OpenTables:
 
 @contextmanager
 def open_tables(
-    artifacts: Mapping[str, Path], cache: Path, stage: str = ""
+    artifacts: Mapping[str, Path],
+    cache: Path,
+    stage: str = "",
+    makers: Sequence[str] | None = None,
 ) -> Iterator[OpenTables]:
     """The tables of a run for several questions.
 
@@ -86,6 +90,8 @@ def open_tables(
         Folder of the tables' Arrow files.
     stage
         What ``getvariable('stage')`` is in a question: the stage that has ended, if one has.
+    makers
+        Of table inputs: the stages whose rows are asked for; None: all.
 
     Yields
     ------
@@ -96,13 +102,7 @@ def open_tables(
     # several threads add up shows in the last digits of a mean.
     with duckdb.connect(config={"python_enable_replacements": False, "threads": 1}) as connection:
         connection.execute("SET VARIABLE stage = $stage", {"stage": stage})
-        yield OpenTables(connection, artifacts, cache)
-
-
-def mentioned(sql: str) -> list[str]:
-    """Tables whose name stands in a question; no other is read."""
-    words = set(re.findall(r"\w+", sql.lower()))
-    return [table.name for table in TABLES if table.name in words]
+        yield OpenTables(connection, artifacts, cache, makers)
 
 
 def remedy_of(sql: str, reason: str, artifacts: Mapping[str, Path]) -> str:

@@ -13,7 +13,7 @@ from pipeline.errors import ArtifactError, ConfigError
 from pipeline.execution import RunFolder
 from pipeline.reporting.two_runs import Clutter, Side, config_changes, object_changes, read_side
 from pipeline.reporting.verdict import success_changes
-from stages.diff import diff
+from stages.diff import diff, identity
 from stages.graph import STAGES
 
 
@@ -50,6 +50,14 @@ def test_page_picture_and_recording_are_there(runs: Path) -> None:
     page = (into / "diff.html").read_text()
     assert "data:image/svg+xml" in page
     assert (into / "diff.rrd").stat().st_size > 0
+
+
+def test_comparisons_of_the_same_objects_open_beside_each_other(side: Side) -> None:
+    """The viewer shows recordings of one id as one, and so the two would lie over each other."""
+    other = replace(side, folder=RunFolder(side.folder.path.parent / "b"))
+    ids = [identity(side, other), identity(other, side), identity(side, side)]
+    assert len(set(ids)) == len(ids)
+    assert identity(side, other) == ids[0]
 
 
 def test_errors_are_those_that_training_told(runs: Path, side: Side) -> None:
