@@ -15,7 +15,7 @@ from pipeline.execution import StageContext, generator
 from pipeline.messages.evaluation import attempt_message
 from pipeline.messages.objects import catalogue
 from pipeline.messages.proposed_contacts import contacts_message
-from pipeline.messages.scenes import read_groups, read_scene
+from pipeline.messages.scenes import read_groups, read_scene, scene_places
 from pipeline.messages.trained import rates_for
 from pipeline.simulation.imperfection import with_imperfection
 from pipeline.simulation.picking import run_clutter
@@ -48,9 +48,8 @@ class ClutterJob:
 class ContactsJob:
     """One work item: contacts in the pictures of one clutter, rated and labelled."""
 
-    number: int  # of the scene in its artifact
+    scene: tuple[Path, int]  # file that holds it, and its number there
     path: Path
-    scenes: Path
     objects: Path
     network: Path
     config: RunConfig
@@ -87,12 +86,11 @@ def contacts_jobs(stage: StageContext) -> list[ContactsJob]:
         if split in (wanted.split, SEEN)
         for index in choose_evenly(len(numbers), wanted.precision.clutters_per_level)
     ]
-    folder = stage.folder.state("evaluate")
+    folder, places = stage.folder.state("evaluate"), scene_places(path)
     return [
         ContactsJob(
-            number=number,
+            scene=places[number],
             path=folder / f"{number}.contacts.mcap",
-            scenes=path,
             **shared_of(stage),
         )
         for number in chosen
@@ -139,7 +137,7 @@ def attempts_at(job: ClutterJob, policy: PolicyName) -> list[Attempt]:
 
 def contacts_at(job: ContactsJob) -> list[ProposedContacts]:
     """Contacts in a clutter's pictures, rated and labelled: one message."""
-    scene = read_scene(job.scenes, job.number)
+    scene = read_scene(*job.scene)
     meshes = {name: item.mesh for name, (item, _) in catalogue(job.objects).items()}
     network, analytic = (rates_for(policy, job.network, job.config.gripper) for policy in RATED_BY)
     rng = generator(job.config.seed, "evaluate contacts", scene.scene_id)

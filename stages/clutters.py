@@ -49,7 +49,7 @@ def scene_jobs(stage: StageContext, known: SettledClutters) -> list[SceneJob]:
     jobs = []
     for level, split in product(sorted(stage.config.scenes.levels), stage.config.scenes.splits):
         for scene_id in clutter_ids(level, split, getattr(counts, split)):
-            path = stage.folder.state("scenes") / f"{scene_id}.mcap"
+            path = stage.shards / f"{scene_id}.mcap"
             job = SceneJob(scene_id, level, split, path, None, *shared)
             settled = known.stands(scene_id, job.drawn_from, pool_of(job))
             jobs.append(replace(job, settled=settled))

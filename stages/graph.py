@@ -16,6 +16,7 @@ SCENES = Stage(
     "scenes",
     ("seed", "scenes", "cameras"),
     ("objects",),
+    sharded=True,
     renders=True,
     shown=("recording.scenes",),
     drawn_apart=True,

@@ -52,14 +52,13 @@ class Portion:
 class ShardJob:
     """One work item: the grasps of one scene."""
 
-    scene_index: int
+    scene: tuple[Path, int]  # file that holds it, and its number there
     portions: tuple[Portion, ...]
     basis: str  # of the keys of portions
     pads: int  # of its grasps, shown in the recording
     shard: Path
     rows: Path  # gets the rows of its grasps, as `make query` and the stage's check ask them
     objects: Path
-    scenes: Path
     config: RunConfig
     provenance: Provenance
 
@@ -113,7 +112,7 @@ class LabelledWorld:
     @cached_property
     def scene(self) -> ClutterScene:
         """What its cameras saw, and where its objects lie."""
-        return read_scene(self.job.scenes, self.job.scene_index)
+        return read_scene(*self.job.scene)
 
     @cached_property
     def surfaces(self) -> RayScene:
@@ -123,7 +122,7 @@ class LabelledWorld:
 
     def taken_over(self, portion: Portion, former: Path) -> list[GraspMessage]:
         """A portion of its grasps as a former shard holds it; no image is read."""
-        scene_key = read_key(self.job.scenes, self.job.scene_index)
+        scene_key = read_key(*self.job.scene)
         key = portion_key(self.job.basis, scene_key, portion.number, portion.grasps)
         return read_portion(former, key)
 

@@ -22,7 +22,7 @@ from pipeline.execution.items import grasps_basis
 from pipeline.labelling.scene import noise_draws
 from pipeline.labelling.shown_pads import SHOWN_SCENES
 from pipeline.messages.grasps import portions_by_key
-from pipeline.messages.scenes import read_keys, scene_count
+from pipeline.messages.scenes import read_keys, scene_places
 from pipeline.recording.grasps import draw_grasps
 from pipeline.spread import choose_evenly
 from stages.graph import GRASPS, inputs_of
@@ -32,13 +32,14 @@ from stages.grasp_shards import Portion, ShardJob, ShardResult, portion_key, syn
 def build(stage: StageContext) -> Summary:
     """Synthesize labelled grasps on every scene, one shard a scene."""
     began, scenes, config = time.process_time(), stage.upstream("scenes"), stage.config
-    basis, count = grasps_basis(stage.key, config), scene_count(scenes)
+    basis, places = grasps_basis(stage.key, config), scene_places(scenes)
+    count = len(places)
     former = former_portions(stage, basis)
     recorded = choose_evenly(count, SHOWN_SCENES)
     pads, provenance = max(1, config.recording.grasps // len(recorded)), stage.provenance()
     jobs = [
         ShardJob(
-            scene_index=index,
+            scene=places[index],
             portions=tuple(
                 Portion(number, grasps, former.get((index, number)))
                 for number, grasps in enumerate(portions)
@@ -48,7 +49,6 @@ def build(stage: StageContext) -> Summary:
             shard=shard_path(stage.shards, index, count),
             rows=stage.folder.state(stage.name) / f"{index:05d}.arrow",
             objects=stage.upstream("objects"),
-            scenes=scenes,
             config=config,
             provenance=provenance,
         )

@@ -62,6 +62,7 @@ def relabelled(source: RunFolder, path: Path, instructions: str, workers: int) -
         path.mkdir(parents=True, exist_ok=True)
         for file in (source.config, source.artifact("objects"), source.artifact("scenes")):
             shutil.copy(file, path / file.name)
+        shutil.copytree(source.shards("scenes"), folder.shards("scenes"))
         for stage in ("grasps", "shards"):
             run_under(instructions, stage, folder, workers)
     return folder

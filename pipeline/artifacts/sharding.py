@@ -41,18 +41,26 @@ def write_index(
     path: Path, provenance: Provenance, entries: list[ShardEntry], quality_histogram: np.ndarray
 ) -> None:
     """Publish the index last, and clear the folder of shards it does not name."""
-    folder = path.with_suffix("")
+    remove_unnamed(path, entries)
+    with ArtifactWriter(path, provenance) as artifact:
+        artifact.write(INDEX_TOPIC, index_message(entries, quality_histogram), log_time_ns=0)
+
+
+def remove_unnamed(path: Path, entries: list[ShardEntry]) -> None:
+    """Remove shards of an index's folder that it does not name."""
     named = {path.parent / entry.path for entry in entries}
-    for stray in sorted(folder.rglob("*.mcap")):
+    for stray in sorted(path.with_suffix("").rglob("*.mcap")):
         if stray not in named:
             stray.unlink()
-    index = ShardIndex(
+
+
+def index_message(entries: list[ShardEntry], quality_histogram: np.ndarray) -> ShardIndex:
+    """The index of some shards, with their samples by tenth of q where these are counted."""
+    return ShardIndex(
         shards=entries,
         samples=sum(entry.samples for entry in entries),
         quality_histogram=to_tensor(quality_histogram.astype(np.int64)),
     )
-    with ArtifactWriter(path, provenance) as artifact:
-        artifact.write(INDEX_TOPIC, index, log_time_ns=0)
 
 
 def read_index(path: Path) -> ShardIndex:

@@ -36,6 +36,7 @@ def driver_share(run: RunFolder) -> dict[str, object]:
         for of_run, of_copy in (
             (run.config, beside.config),
             *((run.artifact(name), beside.artifact(name)) for name in ("objects", "scenes")),
+            (run.shards("scenes"), beside.shards("scenes")),
         ):
             of_copy.symlink_to(of_run.resolve())
         command = [sys.executable, "-m", "stages.grasps", "--run", beside.path.name]

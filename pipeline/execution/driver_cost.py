@@ -23,42 +23,54 @@ class DriverClock:
         self._start_s = 0.0
         self._results = 0
         self._workers_s = 0.0
-        self._grasps = 0
+        self._here_s = 0.0
+        self._made = 0
 
-    def book(self, spent_s: float, grasps: int) -> None:
+    def book(self, spent_s: float, made: int, here_s: float | None = None) -> None:
         """Note a result as it arrives.
 
         Parameters
         ----------
         spent_s
             Processor time of making it, wherever that was [s]; 0: it was there already.
-        grasps
-            How many it holds.
+        made
+            How many grasps, or scenes, it holds.
+        here_s
+            What of that this process spent [s]; None: nothing where items have processes of their
+            own, else all.
         """
+        if here_s is None:
+            here_s = 0.0 if self._has_workers else spent_s
         self._results += 1
         if self._results == 1:  # by now jobs are planned, processes started and given work
             self._first = time.process_time()
-            self._start_s = self._first - self._began - (0.0 if self._has_workers else spent_s)
+            self._start_s = self._first - self._began - here_s
         elif spent_s:
             self._workers_s += spent_s
-            self._grasps += grasps
+            self._here_s += here_s
+            self._made += made
 
-    def cost(self) -> dict[str, float]:
+    def cost(self, of: str = "grasps") -> dict[str, float]:
         """The driver's start, and what the results after the first cost it, until now.
+
+        Parameters
+        ----------
+        of
+            What is made.
 
         Returns
         -------
         `driver_start_s` [s] and what `driver_cost` tells; nothing where there are no such results.
         """
-        spent_s = (
-            time.process_time() - self._first - (0.0 if self._has_workers else self._workers_s)
-        )
-        cost = driver_cost(spent_s, self._workers_s, self._grasps)
+        spent_s = time.process_time() - self._first - self._here_s
+        cost = driver_cost(spent_s, self._workers_s, self._made, of)
         return {"driver_start_s": round(self._start_s, 4), **cost} if cost else {}
 
 
-def driver_cost(driver_s: float, workers_s: float, grasps: int) -> dict[str, float]:
-    """The driver's share of the work on some grasps.
+def driver_cost(
+    driver_s: float, workers_s: float, made: int, of: str = "grasps"
+) -> dict[str, float]:
+    """The driver's share of some work.
 
     Parameters
     ----------
@@ -66,18 +78,20 @@ def driver_cost(driver_s: float, workers_s: float, grasps: int) -> dict[str, flo
         The driver's own processor time [s].
     workers_s
         Processor time of the work items, wherever they were made [s].
-    grasps
-        How many grasps were made; none: nothing is said.
+    made
+        How many grasps, or scenes, were made; none: nothing is said.
+    of
+        What is made.
 
     Returns
     -------
-    The driver's seconds a thousand grasps, and the number of nodes of eight cores whose results one
-    driver can take: as many cores as workers' seconds go on one of the driver's.
+    The driver's seconds a thousand of them, and the number of nodes of eight cores whose results
+    one driver can take: as many cores as workers' seconds go on one of the driver's.
     """
-    if grasps == 0:
+    if made == 0:
         return {}
     spent_s = max(driver_s, LEAST_S)
     return {
-        "driver_s_per_1000_grasps": round(1000 * spent_s / grasps, 6),
+        f"driver_s_per_1000_{of}": round(1000 * spent_s / made, 6),
         "nodes_one_driver_feeds": round(workers_s / spent_s / NODE_CORES, 1),
     }

@@ -20,6 +20,7 @@ from loguru import logger
 from pipeline.artifacts import open_artifact, publish_bytes, read_provenance
 from pipeline.artifacts.digests import MEMO
 from pipeline.artifacts.publishing import CANNOT_WRITE, remove_abandoned_scratch, write_error
+from pipeline.artifacts.sharding import listed_shards
 from pipeline.config import load_run_config
 from pipeline.errors import SoftgripError
 from pipeline.execution.commands import EXIT_FAILURE, log_to
@@ -226,8 +227,12 @@ def _publish_layout(context: StageContext) -> None:
     from pipeline.interchange.foxglove_layouts import foxglove_layout
 
     with open_artifact(context.output) as artifact:
-        layout = foxglove_layout(artifact.counts())
-    publish_bytes(context.folder.layout(context.name), layout)
+        topics = artifact.counts()
+    # What a person looks at lies in the files that an index names, where there is one.
+    if context.stage.sharded and (shards := listed_shards(context.output)):
+        with open_artifact(shards[0]) as artifact:
+            topics |= artifact.counts()
+    publish_bytes(context.folder.layout(context.name), foxglove_layout(topics))
 
 
 def _publish_summary(context: StageContext, record: Summary) -> None:

@@ -7,6 +7,7 @@ from loguru import logger
 
 from pipeline.artifacts import open_artifact, read_provenance
 from pipeline.artifacts.digests import MEMO
+from pipeline.artifacts.sharding import INDEX_TOPIC
 from pipeline.config import load_run_config
 from pipeline.errors import ArtifactError, ConfigError
 from pipeline.execution.code import DRAWING, RUNNING
@@ -110,8 +111,13 @@ def recording_is_fresh(context: StageContext) -> bool:
 
 
 def missing_shards(index: Path) -> list[Path]:
-    """Files that a sharded artifact's index names and that are not there."""
+    """Files that a sharded artifact's index names and that are not there.
+
+    Of a version whose stage wrote one file alone, there is no index, and none is missing.
+    """
     with open_artifact(index) as artifact:
+        if INDEX_TOPIC not in artifact.counts():
+            return []
         entries = artifact.one(ShardIndex).shards
     paths = [index.parent / entry.path for entry in entries]
     return [path for path in paths if not path.is_file()]

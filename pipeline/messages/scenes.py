@@ -1,13 +1,14 @@
 """Clutter scenes ↔ softgrip.v1.Scene, their images on foxglove topics beside it.
 
-Scene i lies at log time i seconds: its record on ``/scenes``, and for every
-viewpoint colour, depth, segmentation and normals as foxglove.RawImage, the camera as
-foxglove.CameraCalibration, and all poses as foxglove.FrameTransforms, so that
-a viewer shows the file as it is.
+The artifact holds the record of scene i on ``/scenes`` at log time i seconds, and names a file for
+each scene. That file holds the record again, for every viewpoint colour, depth, segmentation and
+normals as foxglove.RawImage, the camera as foxglove.CameraCalibration, and all poses as
+foxglove.FrameTransforms, so that a viewer shows it as it is. Artifacts of older versions hold all
+of this themselves, scene i at log time i seconds; such are read as well.
 """
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import cast, get_args
 
@@ -15,7 +16,14 @@ import numpy as np
 from foxglove_schemas_protobuf.RawImage_pb2 import RawImage
 
 from pipeline.artifacts.names import file_name
+from pipeline.artifacts.provenance import Provenance
 from pipeline.artifacts.reading import Artifact, open_artifact
+from pipeline.artifacts.sharding import (
+    INDEX_TOPIC,
+    index_message,
+    listed_shards,
+    remove_unnamed,
+)
 from pipeline.artifacts.tensors import from_tensor, tensors_of, to_tensor
 from pipeline.artifacts.writing import ArtifactWriter
 from pipeline.clutter.levels import level_of
@@ -26,6 +34,7 @@ from pipeline.world.cameras import PinholeCamera
 from pipeline.world.scene import ClutterScene, PlacedObject
 from pipeline.world.view import CameraView
 from schemas.softgrip.v1 import scenes_pb2
+from schemas.softgrip.v1.grasps_pb2 import ShardEntry
 
 TOPIC = "/scenes"
 NS_PER_SCENE = 1_000_000_000  # a second of log time a scene, so that viewers step through them
@@ -99,18 +108,81 @@ def scene_message(scene: ClutterScene, renderer: str) -> scenes_pb2.Scene:
     )
 
 
+def write_scene_index(
+    path: Path,
+    provenance: Provenance,
+    records: Sequence[scenes_pb2.Scene],
+    entries: list[ShardEntry],
+) -> None:
+    """Publish the artifact once the files of all scenes are there; other files are removed.
+
+    Parameters
+    ----------
+    path
+        The artifact.
+    provenance
+        What made it.
+    records
+        Of the scenes, in order.
+    entries
+        What their files are, in the same order.
+    """
+    remove_unnamed(path, entries)
+    with ArtifactWriter(path, provenance) as artifact:
+        for index, record in enumerate(records):
+            artifact.write(TOPIC, record, index * NS_PER_SCENE)
+        artifact.end_chunk()
+        artifact.write(INDEX_TOPIC, index_message(entries, np.zeros(0)), log_time_ns=0)
+
+
 def scene_count(path: Path) -> int:
     """How many scenes an artifact holds."""
     with open_artifact(path) as artifact:
         return artifact.counts()[TOPIC][1]
 
 
-def read_scene(path: Path, index: int) -> ClutterScene:
-    """Scene ``index`` with its images."""
+def scene_places(path: Path) -> list[tuple[Path, int]]:
+    """Where each scene lies with its images: a file, and the scene's number in it.
+
+    Who works on one scene is given its place, and need not read what is known of all.
+
+    Parameters
+    ----------
+    path
+        The artifact, of any version.
+
+    Returns
+    -------
+    Of each scene a file of its own and 0; of an older version this artifact and a number.
+    """
     with open_artifact(path) as artifact:
-        message, time_ns = _message(artifact, index)
-        views = tuple(_view(artifact, viewpoint, time_ns) for viewpoint in message.viewpoints)
-        return _scene(message, views)
+        indexed, count = INDEX_TOPIC in artifact.counts(), artifact.counts()[TOPIC][1]
+    if indexed:
+        return [(file, 0) for file in listed_shards(path)]
+    return [(path, number) for number in range(count)]
+
+
+def read_scene(path: Path, index: int) -> ClutterScene:
+    """Scene ``index`` of an artifact, or of a file that `scene_places` names, with its images."""
+    with open_artifact(path) as artifact:
+        if INDEX_TOPIC not in artifact.counts():
+            return _whole_scene(artifact, index)
+    files = listed_shards(path)
+    if index >= len(files):
+        raise ArtifactError(f"{path} holds no scene {index}", "Make the scenes again")
+    with open_artifact(files[index]) as artifact:
+        return _whole_scene(artifact, 0)
+
+
+def read_record(path: Path) -> scenes_pb2.Scene:
+    """The record of a scene that has a file of its own; no image is read."""
+    with open_artifact(path) as artifact:
+        return _message(artifact, 0)[0]
+
+
+def scene_of(record: scenes_pb2.Scene) -> ClutterScene:
+    """The scene that a record tells of, without what cameras saw: `views` is empty."""
+    return _scene(record, ())
 
 
 def read_groups(path: Path) -> list[tuple[str, int]]:
@@ -139,30 +211,6 @@ def read_keys(path: Path) -> list[str]:
         return [scene.key for _, scene in artifact.messages(scenes_pb2.Scene)]
 
 
-def numbers_by_key(path: Path, wanted: Collection[str]) -> dict[str, int]:
-    """Which scenes of an artifact can be taken over.
-
-    Parameters
-    ----------
-    path
-        The artifact, which may be missing.
-    wanted
-        Keys of scenes.
-
-    Returns
-    -------
-    Key → number of each that it holds; none where any byte of it is damaged.
-    """
-    try:
-        found = {key: n for n, key in enumerate(read_keys(path)) if key in wanted}
-        if found:
-            with open_artifact(path) as artifact:
-                artifact.check()
-    except ArtifactError:
-        return {}  # made anew, all of it
-    return found
-
-
 def read_placements(path: Path) -> dict[str, tuple[PlacedObject, ...]]:
     """Scene id → its objects where they lie, in the order of the scenes; no image is read."""
     with open_artifact(path) as artifact:
@@ -171,14 +219,20 @@ def read_placements(path: Path) -> dict[str, tuple[PlacedObject, ...]]:
 
 def read_scenes(path: Path) -> Iterator[ClutterScene]:
     """All scenes, in order, one in memory at a time."""
-    for index in range(scene_count(path)):
-        yield read_scene(path, index)
+    for place in scene_places(path):
+        yield read_scene(*place)
 
 
 def read_unseen_scenes(path: Path) -> list[ClutterScene]:
     """All scenes, in order, without what cameras saw of them: `views` is empty."""
     with open_artifact(path) as artifact:
-        return [_scene(message, ()) for _, message in artifact.messages(scenes_pb2.Scene)]
+        return [scene_of(record) for _, record in artifact.messages(scenes_pb2.Scene)]
+
+
+def _whole_scene(artifact: Artifact, index: int) -> ClutterScene:
+    message, time_ns = _message(artifact, index)
+    views = tuple(_view(artifact, viewpoint, time_ns) for viewpoint in message.viewpoints)
+    return _scene(message, views)
 
 
 def _message(artifact: Artifact, index: int) -> tuple[scenes_pb2.Scene, int]:

@@ -1,7 +1,7 @@
 """Every message type, with anything in its fields, comes back from a file as it went in."""
 
 import importlib
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,14 +17,23 @@ from hypothesis.extra import numpy as hnp
 from scipy.spatial.transform import Rotation
 
 from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact, to_tensor
+from pipeline.artifacts.sharding import shard_entry
 from pipeline.artifacts.tensors import DTYPES
+from pipeline.errors import ArtifactError
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.shape import ShapeClass
 from pipeline.messages.clouds import cloud_batch
 from pipeline.messages.objects import object_message, object_of, read_objects
 from pipeline.messages.samples import STORED_AS, sample_batch, samples_of
-from pipeline.messages.scenes import read_scene, write_scene
+from pipeline.messages.scenes import (
+    read_record,
+    read_scene,
+    read_unseen_scenes,
+    scene_places,
+    write_scene,
+    write_scene_index,
+)
 from pipeline.network.samples import Samples
 from pipeline.world.cameras import PinholeCamera
 from pipeline.world.scene import ClutterScene, PlacedObject
@@ -249,3 +258,34 @@ def test_scenes_round_trip_with_their_images(
             write_scene(artifact, index, scene, "embree")
     for index, scene in enumerate(scenes):
         same(read_scene(path, index), scene)
+    assert scene_places(path) == [(path, 0), (path, 1)]  # of an older version: all in one file
+
+
+def test_scenes_in_files_of_their_own_are_read_by_their_index(
+    tmp_path: Path, provenance: Provenance
+) -> None:
+    rng = np.random.default_rng(5)
+    path, placed = tmp_path / "scenes.mcap", (PlacedObject("o", 1, rigid(rng)),)
+    files = [tmp_path / "scenes" / f"{name}.mcap" for name in ("a", "b", "stray")]
+    scenes = [
+        ClutterScene(f"s{n}", 3, "val", n, placed, np.ones(1), (), 0.5, (a_view(rng, n, False),))
+        for n in range(3)
+    ]
+    for file, scene in zip(files, scenes, strict=True):
+        with ArtifactWriter(file, provenance) as artifact:
+            write_scene(artifact, 0, scene, "embree")
+    kept = files[:2]
+    entries = [shard_entry(file, tmp_path, 1, "val") for file in kept]
+    write_scene_index(path, provenance, [read_record(file) for file in kept], entries)
+    assert not files[2].exists()
+    assert scene_places(path) == [(file, 0) for file in kept]
+    for index, scene in enumerate(scenes[:2]):
+        same(read_scene(path, index), scene)
+        same(read_scene(*scene_places(path)[index]), scene)
+    for found, scene in zip(read_unseen_scenes(path), scenes, strict=False):
+        same(found, replace(scene, views=()))
+    with pytest.raises(ArtifactError, match="holds no scene 2"):
+        read_scene(path, 2)
+    kept[1].unlink()
+    with pytest.raises(ArtifactError, match=r"b\.mcap is missing"):
+        read_scene(path, 0)

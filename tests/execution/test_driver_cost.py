@@ -8,7 +8,7 @@ from pipeline.execution.driver_cost import DriverClock, driver_cost
 
 
 def test_a_driver_of_one_second_feeds_as_many_cores_as_workers_seconds() -> None:
-    cost = driver_cost(driver_s=1.0, workers_s=1600.0, grasps=2_000_000)
+    cost = driver_cost(driver_s=1.0, workers_s=1600.0, made=2_000_000)
     assert cost["driver_s_per_1000_grasps"] == pytest.approx(0.0005)
     assert cost["nodes_one_driver_feeds"] == pytest.approx(200.0)
 
@@ -31,6 +31,19 @@ def test_the_start_is_told_apart_and_work_in_the_driver_s_process_is_not_the_dri
     assert cost["driver_start_s"] == pytest.approx(4.0 if has_workers else 1.0)
     assert cost["driver_s_per_1000_grasps"] == pytest.approx(of_driver)
     assert cost["nodes_one_driver_feeds"] == pytest.approx(1.5 / of_driver / 8, abs=0.05)
+
+
+def test_of_a_scene_the_driver_may_have_rendered_a_part_itself(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    seen = iter([14.0, 16.0])
+    monkeypatch.setattr(time, "process_time", lambda: next(seen))
+    clock = DriverClock(10.0, has_workers=True)
+    clock.book(3.0, 1, here_s=2.5)
+    clock.book(2.0, 1, here_s=1.8)
+    cost = clock.cost("scenes")
+    assert cost["driver_start_s"] == pytest.approx(1.5)
+    assert cost["driver_s_per_1000_scenes"] == pytest.approx(200.0)
 
 
 def test_of_one_result_nothing_is_said() -> None:

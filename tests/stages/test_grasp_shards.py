@@ -13,6 +13,7 @@ from pipeline.asking.rows import ROWS
 from pipeline.config import load_run_config
 from pipeline.errors import SceneError
 from pipeline.execution import RunFolder
+from pipeline.messages.scenes import scene_places
 from pipeline.recording.grasps import shown_grasps
 from stages.grasp_shards import Portion, ShardJob, synthesize_shard
 
@@ -23,14 +24,13 @@ def unseen(run: RunFolder, tmp_path: Path) -> ShardJob:
     config = load_run_config(run.config)
     grasps = config.grasps.model_copy(update={"seen_angle_max_rad": 1e-9})
     return ShardJob(
-        scene_index=0,
+        scene=scene_places(run.artifact("scenes"))[0],
         portions=(Portion(0, 10, None),),
         basis="a basis",
         pads=2,
         shard=tmp_path / "shard.mcap",
         rows=tmp_path / "rows.arrow",
         objects=run.artifact("objects"),
-        scenes=run.artifact("scenes"),
         config=config.model_copy(update={"grasps": grasps}),
         provenance=read_provenance(run.artifact("grasps")),
     )

@@ -161,11 +161,16 @@ def test_only_what_is_new_is_made(tmp_path: Path, splits: str, first: list[int])
     assert placed & {f"box_{box}" for box in new}
     files = run.files()
     assert files == run.files_made_at_once(tmp_path / "once")
-    # Nothing is taken over from an artifact of which one byte is damaged: it is made anew.
-    damaged = bytearray(files["scenes.mcap"])
+    # A scene of whose file one byte is damaged is made anew, whatever became of the index.
+    name = "scenes/level1-train-00.mcap"
+    damaged = bytearray(files[name])
     damaged[len(damaged) // 2] ^= 1
-    run.folder.artifact("scenes").write_bytes(damaged)
-    assert run.make(stages=2) == [(7, 0), (0, 5)]
+    (run.folder.path / name).write_bytes(damaged)
+    run.folder.artifact("scenes").unlink()
+    run.clutters = 4
+    assert run.make(stages=2) == [(7, 0), (4, 2)]
+    run.clutters = 3
+    assert run.make(stages=2) == [(7, 0), (5, 0)]
     assert run.files() == files
 
 

@@ -32,7 +32,8 @@ def made(run: RunFolder, tmp_path_factory: pytest.TempPathFactory) -> RunFolder:
     folder = RunFolder(runs / "tiny" / "referee")
     for name in ("objects", "scenes", "grasps"):
         shutil.copy(run.artifact(name), folder.artifact(name))
-    shutil.copytree(run.shards("grasps"), folder.shards("grasps"))
+    for name in ("scenes", "grasps"):
+        shutil.copytree(run.shards(name), folder.shards(name))
     judge("tiny", 1, runs)
     return folder
 

@@ -17,7 +17,7 @@ from tests.stages.test_pipeline import digests
 
 # What must be there before the kill: the first finished piece where a stage makes pieces.
 FIRST_PIECE = {
-    "scenes": ".state/scenes/*.mcap",
+    "scenes": "scenes/*.mcap",
     "grasps": "grasps/*.mcap",
     "evaluate": ".state/evaluate/*.mcap",
 }

@@ -131,6 +131,7 @@ def test_two_nodes_without_a_common_folder_make_the_bytes_of_local_processes(
     here.path.mkdir(parents=True)
     for path in (run.config, run.artifact("objects"), run.artifact("scenes")):
         shutil.copy(path, here.path)
+    shutil.copytree(run.shards("scenes"), here.shards("scenes"))
     with pytest.raises(RuntimeError, match="which is the driver's"):
         list(run_on_ray(open_there, [str(here.config)]))
     store = ObjectStore(f"{URL}/tiny", 10.0)
