@@ -1,10 +1,21 @@
-"""The surface under a pad: one ray down the approach from each of its vertices (S-1.07)."""
+"""The surface under a pad: what lies down the approach from each of its vertices (S-1.07).
+
+Triangles are drawn onto the pad's vertices, or, where they are many and small, rays are cast. Rays
+are rounded to single precision (some 1e-7 of the scene, which moves what lies at an outline), lines
+are not; elsewhere both find the same within 1e-8 m.
+"""
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from pipeline.gripper.pad import Pad
+from pipeline.world.lines_down import PosedBlocks, follow_lines
 from pipeline.world.raycasting import Surfaces
+from pipeline.world.triangle_blocks import blocks_of, mean_area_m2
+
+# Rays are quicker where triangles are smaller than this: a fifth of what a vertex of the pad of
+# Table I has for itself. Measured in `runs/SPEED.md`.
+_FINEST_M2 = 0.7e-6
 
 
 def pad_heights(
@@ -24,12 +35,42 @@ def pad_heights(
     pad
         The pad in GCS, of v vertices.
     clearance_m
-        Height above the origin at which rays begin [m]; they miss everything higher.
+        Height above the origin from which the surface is sought [m]; everything higher is missed.
 
     Returns
     -------
     Heights, shape (n, v) [m], -inf where nothing is below; and the body that is hit there, shape
     (n, v), -1 for none.
+    """
+    bodies = surfaces.bodies
+    if bodies and all(mean_area_m2(mesh) >= _FINEST_M2 for mesh, _, _ in bodies):
+        posed = [PosedBlocks(blocks_of(mesh), pose, number) for mesh, pose, number in bodies]
+        return follow_lines(posed, world_from_contact, pad.vertices_xy_m, clearance_m)
+    return pad_heights_by_rays(world_from_contact, surfaces, pad, clearance_m)
+
+
+def pad_heights_by_rays(
+    world_from_contact: Float[np.ndarray, "n 4 4"],
+    surfaces: Surfaces,
+    pad: Pad,
+    clearance_m: float,
+) -> tuple[Float[np.ndarray, "n v"], Int[np.ndarray, "n v"]]:
+    """The same as `pad_heights` by one ray from each vertex.
+
+    Parameters
+    ----------
+    world_from_contact
+        Pose of each grasp, shape (n, 4, 4).
+    surfaces
+        Everything that the pad may touch.
+    pad
+        The pad in GCS, of v vertices.
+    clearance_m
+        Height above the origin at which rays begin [m].
+
+    Returns
+    -------
+    Heights and bodies, both of shape (n, v).
     """
     count, vertices = len(world_from_contact), len(pad.vertices_xy_m)
     above = np.column_stack([pad.vertices_xy_m, np.full(vertices, clearance_m)])

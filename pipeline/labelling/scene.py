@@ -42,7 +42,8 @@ def scene_surfaces(
     -------
     Surfaces for ray casting; hits name the objects by body id and the table by 0.
     """
-    return surfaces_at_rest(bodies_at_rest(scene.objects, meshes, table_side_m))
+    bodies = bodies_at_rest(scene.objects, meshes, table_side_m)
+    return surfaces_at_rest(bodies, scene.objects, meshes)
 
 
 def label_scene(

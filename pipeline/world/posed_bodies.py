@@ -7,6 +7,7 @@ at it.
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from types import MappingProxyType
 
 import numba
 import numpy as np
@@ -14,7 +15,7 @@ from jaxtyping import Float, Int
 
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.transforms import invert, transform_points
-from pipeline.world.raycasting import RayHits, RayScene
+from pipeline.world.raycasting import RayHits, RayScene, RestingBody
 from pipeline.world.scene import PlacedObject
 from pipeline.world.table import table_mesh
 
@@ -43,9 +44,28 @@ def bodies_at_rest(
     return bodies | {TABLE: table_mesh(table_side_m)}
 
 
-def surfaces_at_rest(bodies: Mapping[int, Mesh]) -> RayScene:
-    """Surfaces of bodies that do not move, for ray casting; hits name them by their ids."""
-    return RayScene(list(bodies.values()), list(bodies))
+def surfaces_at_rest(
+    bodies: Mapping[int, Mesh],
+    placed: Sequence[PlacedObject] = (),
+    meshes: Mapping[str, Mesh] = MappingProxyType({}),
+) -> RayScene:
+    """Surfaces of bodies that do not move; hits name them by their ids.
+
+    Parameters
+    ----------
+    bodies
+        Body id → surface in WCS [m].
+    placed
+        The objects and their poses, where what is kept for their meshes is to be used.
+    meshes
+        Surface of each of these objects by its name, in the object's own frame [m].
+
+    Returns
+    -------
+    The surfaces.
+    """
+    own = {p.body_id: (meshes[p.object_name], p.world_from_object) for p in placed}
+    return RayScene(list(bodies.values()), list(bodies), own)
 
 
 class PosedBodies:
@@ -68,6 +88,11 @@ class PosedScene:
     ) -> None:
         self._bodies = bodies
         self._half_m = table_half_m
+
+    @property
+    def bodies(self) -> tuple[RestingBody, ...]:
+        """Nothing: they move, and few lines are followed before they do."""
+        return ()
 
     def cast(
         self, origins_m: Float[np.ndarray, "n 3"], directions: Float[np.ndarray, "n 3"]

@@ -1,8 +1,8 @@
 """First hits of many rays with many bodies: Embree finds the triangle, float64 the distance."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numba
 import numpy as np
@@ -40,9 +40,22 @@ class RayHits:
     triangle: Int[np.ndarray, " n"]
 
 
+class RestingBody(NamedTuple):
+    """A mesh in its own frame, where it stays the same in all scenes, its pose and its number."""
+
+    mesh: Mesh
+    world_from_mesh: Float[np.ndarray, "4 4"]
+    body_id: int
+
+
 class Surfaces(Protocol):
     """Surfaces of bodies at which rays can be cast: fixed (`RayScene`), or at poses that change
     (`posed_bodies.PosedScene`)."""
+
+    @property
+    def bodies(self) -> tuple["RestingBody", ...]:
+        """What can be drawn instead of cast at, highest first; nothing where rays must be cast."""
+        ...
 
     def cast(
         self, origins_m: Float[np.ndarray, "n 3"], directions: Float[np.ndarray, "n 3"]
@@ -66,6 +79,8 @@ class RayScene:
         Meshes in the scene's frame, usually the world.
     body_ids
         Number by which `RayHits` names each body, distinct and not negative; by default its index.
+    placed
+        Body id → a mesh in its own frame and its pose: what the body was made from.
 
     Raises
     ------
@@ -73,7 +88,12 @@ class RayScene:
         The bodies have no triangle, or the ids are not one for each body, distinct and from 0.
     """
 
-    def __init__(self, bodies: Sequence[Mesh], body_ids: Sequence[int] | None = None) -> None:
+    def __init__(
+        self,
+        bodies: Sequence[Mesh],
+        body_ids: Sequence[int] | None = None,
+        placed: Mapping[int, tuple[Mesh, Float[np.ndarray, "4 4"]]] | None = None,
+    ) -> None:
         counts = [len(body.faces) for body in bodies]
         if sum(counts) == 0:
             raise ValueError("a ray scene needs at least one triangle")
@@ -92,12 +112,24 @@ class RayScene:
         self._body_of_face = np.repeat(ids, counts)
         self._first_face = np.zeros(int(ids.max()) + 1, dtype=np.int64)  # by body id
         self._first_face[ids] = np.cumsum([0, *counts])[:-1]
+        own = dict(placed or {})
+        tops = [float(body.vertices_m[:, 2].max(initial=-np.inf)) for body in bodies]
+        self._bodies = tuple(
+            RestingBody(*own.get(int(ids[i]), (bodies[i], np.eye(4))), int(ids[i]))
+            for i in np.argsort(tops, kind="stable")[::-1]
+            if counts[i] > 0
+        )
         self._embree = rtcore_scene.EmbreeScene(robust=True)
         TriangleMesh(
             scene=self._embree,
             vertices=((vertices - self._centre) * self._scale).astype(np.float32),
             indices=faces.astype(np.int32),
         )
+
+    @property
+    def bodies(self) -> tuple[RestingBody, ...]:
+        """The bodies, highest first."""
+        return self._bodies
 
     @property
     def triangle_normals(self) -> Float[np.ndarray, "m 3"]:
