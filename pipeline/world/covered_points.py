@@ -141,7 +141,7 @@ def near_points(
 
 # Sums in any order and fused products are safe here: bounds have room, and lanes' bits are exact.
 @numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})  # type: ignore[untyped-decorator]
-def _may_cover(edges: Float[np.ndarray, " 160"], x: float, y: float, height: float) -> int:
+def _may_cover(edges: Float[np.ndarray, " 160"], x: float, y: float, height: float) -> np.uint32:
     """Lanes whose triangle may cover a point and may be higher there, one bit for each."""
     lanes, nought = np.float32(0.0), np.float32(0.0)
     for k in range(LANES):

@@ -223,11 +223,11 @@ def _draw(
             pairs = pairs_of(found_at, found_lanes, found, pair_at, pair_lane)
             heights_on(seen, x, y, pair_at, pair_lane, pairs, top, pair_z)
             for pair in range(pairs):
-                i, z = _at(pair_at[_at(pair)]), pair_z[_at(pair)]
-                to_point = _at(order[i])
-                if z > height[to_point]:
-                    height[to_point], so_far[i] = z, np.float32(z)
-                    body[to_point] = number
+                at, z = _at(pair_at[_at(pair)]), pair_z[_at(pair)]
+                point = _at(order[at])
+                if z > height[point]:
+                    height[point], so_far[at] = z, np.float32(z)
+                    body[point] = number
 
 
 @numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
@@ -282,7 +282,7 @@ def _points_in(within: Int[np.ndarray, "more more"], cells: Int[np.ndarray, " 64
     )
     if left >= right or low >= high:
         return 0
-    return within[high, right] - within[low, right] - within[high, left] + within[low, left]
+    return int(within[high, right] - within[low, right] - within[high, left] + within[low, left])
 
 
 @numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]

@@ -71,9 +71,13 @@ def _cells_of(points: bytes) -> PointCells:
     xy = np.frombuffer(points, dtype=np.float64).reshape(-1, 2)
     order, lower, per_m, rows, within = _sorted_into_cells(xy)
     x, y = xy[order].T
-    arrays = (order, x, y, x.astype(np.float32), y.astype(np.float32), lower)
     return PointCells(
-        *(read_only(np.ascontiguousarray(array)) for array in arrays),
+        order=read_only(order),
+        x_m=read_only(x.copy()),
+        y_m=read_only(y.copy()),
+        near_x_m=read_only(x.astype(np.float32)),
+        near_y_m=read_only(y.astype(np.float32)),
+        lower_m=read_only(lower),
         per_m=per_m,
         rows=read_only(rows),
         within=read_only(within),

@@ -112,10 +112,11 @@ class RayScene:
         self._body_of_face = np.repeat(ids, counts)
         self._first_face = np.zeros(int(ids.max()) + 1, dtype=np.int64)  # by body id
         self._first_face[ids] = np.cumsum([0, *counts])[:-1]
-        own = dict(placed or {})
+        own = {int(i): (body, np.eye(4)) for i, body in zip(ids, bodies, strict=True)}
+        own |= placed or {}
         tops = [float(body.vertices_m[:, 2].max(initial=-np.inf)) for body in bodies]
         self._bodies = tuple(
-            RestingBody(*own.get(int(ids[i]), (bodies[i], np.eye(4))), int(ids[i]))
+            RestingBody(*own[int(ids[i])], body_id=int(ids[i]))
             for i in np.argsort(tops, kind="stable")[::-1]
             if counts[i] > 0
         )

@@ -96,8 +96,15 @@ def build_blocks(corners_m: Float[np.ndarray, "m 3 3"]) -> TriangleBlocks:
     face = _sorted_by(keys)
     centre = (lower + upper) / 2
     blocks, first, count, boxes = _boxed(corners_m, face, centre)
-    arrays = (read_only(array) for array in (blocks, face, first, count, boxes, centre))
-    return TriangleBlocks(*arrays, extent_m=extent)
+    return TriangleBlocks(
+        corners_m=read_only(blocks),
+        face=read_only(face),
+        first=read_only(first),
+        count=read_only(count),
+        boxes_m=read_only(boxes),
+        centre_m=read_only(centre),
+        extent_m=extent,
+    )
 
 
 @numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
@@ -153,7 +160,7 @@ def _curve_keys(
 
 
 @numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
-def _hilbert(x: int, y: int, z: int) -> int:
+def _hilbert(x: np.int64, y: np.int64, z: np.int64) -> np.int64:
     """Place of a cell on Hilbert's curve in three dimensions (Skilling, 2004)."""
     highest = np.int64(1) << (_BITS - 1)
     bit = highest
@@ -182,11 +189,12 @@ def _hilbert(x: int, y: int, z: int) -> int:
         if z & bit:
             turned ^= bit - 1
         bit >>= 1
-    return (_spread(x ^ turned) << 2) | (_spread(y ^ turned) << 1) | _spread(z ^ turned)
+    place = (_spread(x ^ turned) << 2) | (_spread(y ^ turned) << 1) | _spread(z ^ turned)
+    return np.int64(place)
 
 
 @numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
-def _spread(number: int) -> int:
+def _spread(number: np.int64) -> np.int64:
     """The number's 16 bits with two zeros before each."""
     number = (number | (number << 16)) & 0x0000FF0000FF
     number = (number | (number << 8)) & 0x00F00F00F00F
