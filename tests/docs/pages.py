@@ -62,6 +62,10 @@ REDUCED = {
         ".venv/bin/python -m pipeline.benchmarks.watching --help",
         "an hour; tests/benchmarks/test_watching.py watches a command of its own",
     ),
+    ".venv/bin/python -m pipeline.benchmarks.watching ten_million watched.jsonl": (
+        ".venv/bin/python -m pipeline.benchmarks.watching --help",
+        "half an hour; tests/benchmarks/test_watching.py watches a command of its own",
+    ),
     ".venv/bin/python -m pipeline.benchmarks.memory_picture watched.jsonl memory.svg": (
         ".venv/bin/python -m pipeline.benchmarks.memory_picture --help",
         "it draws what the command before it writes; tests/benchmarks/test_watching.py draws",
