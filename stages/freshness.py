@@ -28,7 +28,6 @@ from pipeline.execution.staleness import (
 )
 from pipeline.geometry.mesh_folders import list_mesh_files
 from pipeline.housekeeping.forecast import Forecast, as_lines, forecast, total_s, work_of
-from pipeline.housekeeping.kept import taken_over
 from pipeline.housekeeping.listing import run_folders
 from stages.graph import EVALUATE, MADE, OBJECTS, RUNS_DIR, SHARDS, STAGES, inputs_of
 
@@ -122,8 +121,9 @@ def planned(folder: RunFolder, mesh_dir: Path | None, goals: list[str]) -> list[
     ConfigError
         A goal ends with no stage.
     """
-    # The embedded shapes are loaded where a plan is made, not wherever a key is computed.
+    # Loaded where a plan is made, not for each of a make's six keys: it takes a second.
     from pipeline.geometry.parametric import PARAMETRIC_OBJECTS
+    from pipeline.housekeeping.kept import taken_over
 
     names = list(STAGES)
     ends = [GOALS.get(goal, goal) for goal in goals]

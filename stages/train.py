@@ -79,7 +79,7 @@ def build(stage: StageContext, ranks: Ranks = ALONE) -> Summary:
         if start
         else None
     )
-    exported = export_for_control(stage, trained, test_set)
+    exported, predictor = export_for_control(stage, trained, test_set)
     checkpoint = save_checkpoint_bytes(trained.network)
     attached = {
         CHECKPOINT: checkpoint,
@@ -91,10 +91,11 @@ def build(stage: StageContext, ranks: Ranks = ALONE) -> Summary:
     write(stage, trained, result_message(trained, figures, tuned), attached)
     inference = runtimes_ms_a_grasp(
         trained.network,
-        ControlPredictor(exported, config.train.threads),
+        predictor,
         test_set.cloud,
         test_set.cloud_mask,
         config.train.threads,
+        config.train.timed_batches,
     )
     told = tuned.headline() if tuned else {}
     return summary(stage, trained, figures, ranks) | told | {"inference_ms_a_grasp": inference}
@@ -118,12 +119,15 @@ def print_epoch(epoch: EpochMetrics) -> None:
     )
 
 
-def export_for_control(stage: StageContext, trained: TrainedNetwork, test_set: Samples) -> bytes:
-    """The network as ONNX, held against the original on test clouds."""
+def export_for_control(
+    stage: StageContext, trained: TrainedNetwork, test_set: Samples
+) -> tuple[bytes, ControlPredictor]:
+    """The network as ONNX and as control runs it, held against the original on test clouds."""
     exported = export_onnx_bytes(trained.network, stage.config.sensing.grid_cells)
     config = stage.config.train
+    predictor = ControlPredictor(exported, config.threads)
     difference = check_export(
-        ControlPredictor(exported, config.threads),
+        predictor,
         trained.network,
         test_set.cloud[:COMPARED],
         test_set.cloud_mask[:COMPARED],
@@ -131,7 +135,7 @@ def export_for_control(stage: StageContext, trained: TrainedNetwork, test_set: S
         config.threads,
     )
     logger.info("train: exported for control, largest difference {:.1e}", difference)
-    return exported
+    return exported, predictor
 
 
 def write(

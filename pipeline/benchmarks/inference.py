@@ -9,6 +9,7 @@ from pipeline.network.ga_cnn import GaCnn, build_network
 from pipeline.network.samples import Samples
 from pipeline.network.timing import runtimes_ms_a_grasp
 
+BATCHES = (1, 64, 512)  # one grasp, a control step, and a bulk
 THREADS = 2  # cores of the smallest machine that is supported
 SECONDS = 3.0  # a batch size: the machine's own hiccups are shorter
 CLOUDS = 512  # the largest batch that is timed
@@ -29,7 +30,7 @@ def figures(config: NetworkConfig, samples: Samples) -> dict[str, object]:
     """Milliseconds a grasp at the network's full size by runtime, and how far both differ."""
     network, exported = sized_network(config, samples.cloud.shape[1])
     cloud, mask = samples.cloud[:CLOUDS], samples.cloud_mask[:CLOUDS]
-    times = runtimes_ms_a_grasp(network, exported, cloud, mask, THREADS, seconds=SECONDS)
+    times = runtimes_ms_a_grasp(network, exported, cloud, mask, THREADS, BATCHES, SECONDS)
     return {
         "inference_ms_a_grasp": {
             name: {size: round(value, 3) for size, value in found.items()}

@@ -37,6 +37,7 @@ def _that_groups_divide(channels: int) -> int:
 
 
 Layers = Annotated[int, AfterValidator(_of_the_family)]
+_TimedBatch = Annotated[int, Field(ge=1, le=65536)]
 _Channels = Annotated[int, Field(ge=2, le=8192), AfterValidator(_that_groups_divide)]
 StageChannels = tuple[_Channels, _Channels, _Channels, _Channels]
 
@@ -110,6 +111,11 @@ class TrainConfig(Section):
         400,
         ge=16,
         description="training samples that the analytic baseline is fitted to, for the comparison",
+    )
+    timed_batches: tuple[_TimedBatch, ...] = Field(
+        (1, 64, 512),
+        min_length=1,
+        description="batch sizes whose time a grasp the summary tells: one, a control step, a bulk",
     )
     threads: int = Field(2, ge=1, le=256, description="CPU threads; part of the run's identity")
     device: Literal["auto", "cpu", "cuda"] = Field(

@@ -14,7 +14,6 @@ Predict = Callable[
     [Float[np.ndarray, "n h w 3"], Bool[np.ndarray, "n h w"]], Float[np.ndarray, " n"]
 ]
 
-BATCHES = (1, 64, 512)  # one grasp, a control step, and a bulk
 _SECONDS = 0.2  # a batch size is timed for so long at least
 _FEWEST_CALLS = 3  # so that a median has a meaning
 
@@ -23,7 +22,7 @@ def milliseconds_a_grasp(
     predict: Predict,
     cloud: Float[np.ndarray, "n h w 3"],
     mask: Bool[np.ndarray, "n h w"],
-    batches: Sequence[int] = BATCHES,
+    batches: Sequence[int],
     seconds: float = _SECONDS,
 ) -> dict[str, float]:
     """Median time of a call over its grasps, for several batch sizes; the first call is left out.
@@ -65,7 +64,7 @@ def runtimes_ms_a_grasp(
     cloud: Float[np.ndarray, "n h w 3"],
     mask: Bool[np.ndarray, "n h w"],
     threads: int,
-    batches: Sequence[int] = BATCHES,
+    batches: Sequence[int],
     seconds: float = _SECONDS,
 ) -> dict[str, dict[str, float]]:
     """Milliseconds a grasp on the CPU of PyTorch and of OpenVINO, one prediction a grasp.

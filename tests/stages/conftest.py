@@ -35,6 +35,7 @@ channels = [8, 8, 16, 16]
 [train]
 epochs = 2
 batch_size = 32
+timed_batches = [1]  # how a larger one is timed is in tests/network/test_timing
 [evaluate]
 attempts_per_clutter = 2
 policies = ["closed-loop", "open-loop", "geometric"]
