@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -36,9 +37,10 @@ def driver_share(run: RunFolder) -> dict[str, object]:
         for of_run, of_copy in (
             (run.config, beside.config),
             *((run.artifact(name), beside.artifact(name)) for name in ("objects", "scenes")),
-            (run.shards("scenes"), beside.shards("scenes")),
         ):
             of_copy.symlink_to(of_run.resolve())
+        # An index names no file outside of its run: a link to the folder would lead there.
+        shutil.copytree(run.shards("scenes"), beside.shards("scenes"))
         command = [sys.executable, "-m", "stages.grasps", "--run", beside.path.name]
         command += ["--runs-dir", scratch, "--workers", str(WORKERS)]
         if code := subprocess.run(command, check=False).returncode:
