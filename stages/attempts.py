@@ -26,7 +26,7 @@ from schemas.softgrip.v1.evaluation_pb2 import Attempt, ProposedContacts
 from stages.graph import GIVEN_NETWORK
 
 SEEN = "train"  # the split whose families the network has seen
-RATED_BY: tuple[PolicyName, ...] = ("closed-loop", "analytic")  # by network and baseline
+RATED_BY: tuple[PolicyName, ...] = ("network", "analytic")  # by each alone
 M = TypeVar("M", bound=Message)
 
 
@@ -125,7 +125,7 @@ def attempts_at(job: ClutterJob, policy: PolicyName) -> list[Attempt]:
     """A policy's attempts at a clutter."""
     objects = {name: item for name, (item, _) in catalogue(job.objects).items()}
     scene, config = job.scene, with_imperfection(job.config, job.scale)
-    score = rates_for(policy, job.network, config.gripper)
+    score = rates_for(policy, job.network, config)
     rng = generator(config.seed, "evaluate", scene.scene_id)
     made = run_clutter(scene, objects, policy, score, config, rng)
     about, judge = (scene.scene_id, scene.level, len(scene.objects)), config.evaluate.judge
@@ -139,7 +139,7 @@ def contacts_at(job: ContactsJob) -> list[ProposedContacts]:
     """Contacts in a clutter's pictures, rated and labelled: one message."""
     scene = read_scene(*job.scene)
     meshes = {name: item.mesh for name, (item, _) in catalogue(job.objects).items()}
-    network, analytic = (rates_for(policy, job.network, job.config.gripper) for policy in RATED_BY)
+    network, analytic = (rates_for(policy, job.network, job.config) for policy in RATED_BY)
     rng = generator(job.config.seed, "evaluate contacts", scene.scene_id)
     found = propose_contacts(scene, meshes, network, analytic, job.config, rng)
     return [contacts_message(scene, found)]

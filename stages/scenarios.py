@@ -108,7 +108,7 @@ def run_scenario(job: ScenarioJob) -> Row:
     """Make one attempt in each trial of a scenario."""
     scenario = SCENARIOS[job.index]
     config = with_segmentation(job.config, scenario)
-    score = rates_for(job.policy, job.network, config.gripper)
+    score = rates_for(job.policy, job.network, config)
     strategy = build_strategy(job.policy, score, config)
     # The same scenes for every policy and condition, and for the same things seen otherwise.
     rng = generator(config.seed, "scenario", scenario.name.removesuffix(", segmented"))

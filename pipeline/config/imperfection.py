@@ -15,7 +15,9 @@ from pydantic import Field, field_validator
 
 from pipeline.config.section import Section
 
-PolicyName = Literal["closed-loop", "analytic", "uncorrected", "one-seal", "open-loop", "geometric"]
+PolicyName = Literal[
+    "closed-loop", "network", "analytic", "uncorrected", "one-seal", "open-loop", "geometric"
+]
 
 
 class ImperfectionConfig(Section):

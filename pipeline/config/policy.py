@@ -200,6 +200,13 @@ class PolicyConfig(ScaledSection):
     retarget_gain: float = Field(
         0.1, ge=0, le=1, description="what q-hat another must promise more for that [1]"
     )
+    analytic_share: float = Field(
+        0.0,
+        ge=0,
+        le=1,
+        description="share of the analytic baseline in the q-hat by which policies choose; the "
+        "rest is the network's [1]",
+    )
     correction_gain: float = Field(
         0.1, ge=0, le=1, description="rise of q-hat that a correction must promise [1]"
     )

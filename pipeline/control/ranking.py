@@ -18,6 +18,32 @@ Predict = Callable[
 """Function of sub clouds in units of r_G and of their seen cells; returns q-hat."""
 
 
+def join_predictions(network: Predict, analytic: Predict, analytic_share: float) -> Predict:
+    """The weighted mean of two q-hats: they err at different grasps.
+
+    Parameters
+    ----------
+    network
+        The network's q-hat.
+    analytic
+        The analytic baseline's.
+    analytic_share
+        Weight of the baseline in [0, 1]; the network has the rest.
+
+    Returns
+    -------
+    The joined q-hat.
+    """
+
+    def predict(
+        cloud: Float[np.ndarray, "n g g 3"], seen: Bool[np.ndarray, "n g g"]
+    ) -> Float[np.ndarray, " n"]:
+        told = np.asarray(network(cloud, seen), dtype=np.float64)
+        return told + analytic_share * (np.asarray(analytic(cloud, seen)) - told)
+
+    return predict
+
+
 class Ranking(Protocol):
     """A value in [0, 1] for every candidate, the best highest."""
 

@@ -10,6 +10,7 @@ def build_strategy(name: PolicyName, predict: Predict, config: RunConfig) -> Str
     """Build one of the policies that are compared.
 
     - closed-loop: takes several views, corrects its aim on the way, and reacts to the wrench.
+    - network: the same, rated by the network alone where `policy.analytic_share` joins both.
     - analytic: the same with the analytic label on the measured cloud in place of the network.
     - uncorrected: closed-loop without corrections.
     - one-seal: the same as closed-loop without a second seal.
@@ -24,8 +25,7 @@ def build_strategy(name: PolicyName, predict: Predict, config: RunConfig) -> Str
     name
         Name of the policy.
     predict
-        Rates grasps: the analytic baseline for policy analytic, for others the network; the
-        geometric policy does not use it.
+        Rates grasps; the geometric policy does not use it.
     config
         The run.
 

@@ -4,9 +4,10 @@ from functools import lru_cache
 from pathlib import Path
 
 from pipeline.artifacts import open_artifact
+from pipeline.config import RunConfig
 from pipeline.config.evaluation import PolicyName
 from pipeline.config.grasps import GripperConfig
-from pipeline.control.ranking import Predict
+from pipeline.control.ranking import Predict, join_predictions
 from pipeline.messages.training import BASELINE, EXPORT
 from pipeline.network.analytic import AnalyticBaseline
 from pipeline.network.control_inference import ControlPredictor
@@ -15,8 +16,8 @@ from pipeline.network.sources import baseline_from_json, released_baseline
 SCORE_THREADS = 1  # clutters run side by side, a worker a core
 
 
-def rates_for(policy: PolicyName, path: Path, gripper: GripperConfig) -> Predict:
-    """What rates grasps for a policy: the network, or the baseline that stands in its place.
+def rates_for(policy: PolicyName, path: Path, config: RunConfig) -> Predict:
+    """What rates grasps for a policy: the network, the baseline, or both joined.
 
     Parameters
     ----------
@@ -24,16 +25,20 @@ def rates_for(policy: PolicyName, path: Path, gripper: GripperConfig) -> Predict
         Name of the policy.
     path
         A train artifact, or an exported network (.onnx).
-    gripper
-        Pad and physics, for the baseline.
+    config
+        Section gripper for the baseline; `evaluate.policy.analytic_share` joins both.
 
     Returns
     -------
     Clouds and masks to q-hat.
     """
-    if policy == "analytic":
-        return fitted_baseline(path, gripper).predict
-    return control_predictor(path).predict
+    share = {"network": 0.0, "analytic": 1.0}.get(policy, config.evaluate.policy.analytic_share)
+    if share == 0.0:
+        return control_predictor(path).predict
+    analytic = fitted_baseline(path, config.gripper).predict
+    if share == 1.0:
+        return analytic
+    return join_predictions(control_predictor(path).predict, analytic, share)
 
 
 @lru_cache(maxsize=1)

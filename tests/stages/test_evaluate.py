@@ -54,14 +54,25 @@ def test_the_analytic_policy_asks_the_baseline_that_was_fitted_to_the_train_spli
         ("analytic", True),
         ("closed-loop", False),
         ("open-loop", False),
+        ("network", False),
     )
-    for policy, same in policies:
-        score = rates_for(policy, run.artifact("train"), gripper)
+    for name, same in policies:
+        score = rates_for(name, run.artifact("train"), context.config)
         found = score(samples.cloud, samples.cloud_mask)
         expected = fitted.predict(samples.cloud, samples.cloud_mask)
-        assert np.array_equal(found, expected) is same, policy
+        assert np.array_equal(found, expected) is same, name
+    policy = context.config.evaluate.policy.model_copy(update={"analytic_share": 0.5})
+    both = context.config.evaluate.model_copy(update={"policy": policy})
+    joined = context.config.model_copy(update={"evaluate": both})
+    closed, network, analytic = (
+        rates_for(rated_by, run.artifact("train"), joined)(samples.cloud, samples.cloud_mask)
+        for rated_by in ("closed-loop", "network", "analytic")
+    )
+    assert np.array_equal(network, found)
+    assert np.array_equal(analytic, expected)
+    assert closed == pytest.approx((network + analytic) / 2)
     # Beside a given network there is no training: the released baseline stands in.
-    beside = rates_for("analytic", run.path / GIVEN_NETWORK, gripper)
+    beside = rates_for("analytic", run.path / GIVEN_NETWORK, context.config)
     assert not np.array_equal(beside(samples.cloud, samples.cloud_mask), expected)
 
 
@@ -137,7 +148,7 @@ def test_without_noise_both_predictions_of_the_network_are_one(run: RunFolder) -
     meshes = {name: one.mesh for name, (one, _) in read_objects(run.artifact("objects")).items()}
     scene = next(iter(read_scenes(run.artifact("scenes"))))
     # In the network's place, for one of two epochs says the same of every cloud.
-    analytic = rates_for("analytic", run.artifact("train"), config.gripper)
+    analytic = rates_for("analytic", run.artifact("train"), config)
     for chosen, same in ((exact, True), (config, False)):
         rng = np.random.default_rng(0)
         found = propose_contacts(scene, meshes, analytic, analytic, chosen, rng)
