@@ -19,6 +19,7 @@ from types import FrameType
 from typing import Any, Literal, TypeVar
 
 from pipeline.errors import SoftgripError
+from pipeline.execution.packed_items import ItemPacker, unpack_item
 from pipeline.execution.run_store import RunStore
 
 Item = TypeVar("Item")
@@ -107,10 +108,11 @@ def _in_processes(
         return
     resource_tracker.ensure_running()  # once it runs, starting a worker lifts no signal mask
     pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"))
+    packer = ItemPacker()
     waiting: deque[Future[Result]] = deque()
     try:
         for item in items:
-            waiting.append(_submit(pool, job, item))
+            waiting.append(_submit(pool, job, packer.pack(item)))
             if len(waiting) >= workers * ahead_per_worker:
                 yield waiting.popleft().result(wait_s(limit_s))
         while waiting:
@@ -148,17 +150,24 @@ def _kill_workers() -> None:
         process.kill()
 
 
-def _submit(pool: ProcessPoolExecutor, job: Callable[[Item], Result], item: Item) -> Future[Result]:
-    """Submit an item, and report a pool that breaks meanwhile as `BrokenProcessPool`.
+def _submit(
+    pool: ProcessPoolExecutor, job: Callable[[Any], Result], packed: bytes
+) -> Future[Result]:
+    """Submit a packed item, and report a pool that breaks meanwhile as `BrokenProcessPool`.
 
     Submitting may start a process. The pool closes its pipes when a worker dies; starting another
     one then fails on the closed pipes with another error.
     """
     try:
         with defer_interrupts():
-            return pool.submit(job, item)
+            return pool.submit(_work_on, job, packed)
     except (ValueError, OSError) as error:
         raise BrokenProcessPool(f"no further worker could be started: {error}") from error
+
+
+def _work_on(job: Callable[[Any], Result], packed: bytes) -> Result:
+    """In a worker: the job of a packed item."""
+    return job(unpack_item(packed))
 
 
 @contextmanager

@@ -19,6 +19,7 @@ from typing import Any, TypeVar
 
 from pipeline.errors import MachineError, SoftgripError
 from pipeline.execution.executors import too_long
+from pipeline.execution.packed_items import ItemPacker
 from pipeline.execution.ray_cluster import MOST_RETRIES, connected, enter
 from pipeline.execution.run_store import Place, RunStore
 from pipeline.execution.stored_items import Done, packed, run_from_store, unpacked
@@ -130,15 +131,18 @@ class Sending:
         Where nodes find the run's files; None: in the folder that this process works in.
     bring
         Whether the files that nodes put in the store come to the run's folder here.
+    packer
+        Packs items where no path travels as a key.
     """
 
     store: RunStore | None = None
     bring: bool = True
+    packer: ItemPacker = field(default_factory=ItemPacker)
 
     def message(self, job: JobByName, item: Any) -> tuple[bytes, str | Place, str]:
         """What `_run_there` is given."""
         if self.store is None:
-            return packed((job, item), None), str(Path.cwd()), program_name()
+            return self.packer.pack((job, item)), str(Path.cwd()), program_name()
         return packed((job, item), self.store.folder.path), self.store.place, program_name()
 
     def result(self, answer: bytes) -> Any:

@@ -16,6 +16,7 @@ FORBIDDEN = ("torch.load", "torch.save", "eval", "exec")
 BETWEEN_OWN_PROCESSES = {
     ROOT / "pipeline/execution/stored_items.py",
     ROOT / "pipeline/execution/isolated.py",
+    ROOT / "pipeline/execution/packed_items.py",
     ROOT / "pipeline/benchmarks/asked.py",
     ROOT / "pipeline/benchmarks/commits.py",
 }
