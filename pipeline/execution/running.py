@@ -133,7 +133,7 @@ def run_stage(
         _renew_date(context)
         logger.info("{}: up to date, nothing to do", name)
         return
-    started, spent_s = time.perf_counter(), processor_time_s()
+    started = time.perf_counter()
     if draw is not None and not force and artifact_is_fresh(context):
         logger.info("{}: the artifact is up to date, its recording is drawn anew", name)
         record = read_summary(context.folder, name)
@@ -149,7 +149,8 @@ def run_stage(
         context, found = checked(context)
     if draw is not None:
         draw_recording(context, draw, figures)
-    wall_s, spent_s = time.perf_counter() - started, processor_time_s() - spent_s
+    # Of the whole process: what Python loads counts in the parts, and so it counts in the whole.
+    wall_s, spent_s = time.perf_counter() - started, processor_time_s()
     record = {
         "stage": name,
         "key": read_provenance(context.output).key,
@@ -174,7 +175,7 @@ def _renew_date(context: StageContext) -> None:
 
 
 def share_of(part: Stopwatch, spent_s: float) -> float:
-    """A part's share of a stage's processor time [1]; what Python loads for it first is counted."""
+    """A part's share of a stage's processor time [1]; what Python loads is counted in both."""
     return round(part.seconds / max(spent_s, CLOCK_TICK_S), 4)
 
 

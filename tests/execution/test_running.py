@@ -67,6 +67,18 @@ def test_a_second_run_does_nothing_and_says_so(folder: Path) -> None:
     assert times_run(folder) == 2
 
 
+def test_what_a_check_costs_is_told_as_a_share_of_the_whole_process(folder: Path) -> None:
+    before = os.times()
+    assert run(folder).returncode == 0
+    after = os.times()
+    spent_s = after.children_user + after.children_system
+    spent_s -= before.children_user + before.children_system
+    told = json.loads((folder / "counting.summary.json").read_text())
+    assert told["expectations_s"] > 0.0
+    # Less than all, for a process that has told its shares still ends; a stage alone is a tenth.
+    assert 0.3 < told["expectations_s"] / told["expectations_share"] / spent_s < 1.2
+
+
 def test_a_stage_of_a_sealed_run_stays_as_it_is_though_everything_changed(folder: Path) -> None:
     """Make calls it where the run came without its bookkeeping; by force it says why not."""
     artifact = folder / "counting.mcap"
