@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from pipeline.messages.proposed_contacts import WorstContact
 from pipeline.recording import colours
-from pipeline.recording.train import SHEET_SPACING
+from pipeline.recording.recording import SHEET_SPACING
 
 WORST = "world/worst"
 WORST_OBJECTS, WORST_EACH = 6, 3  # rows and pairs of columns: as many as can be looked at

@@ -37,6 +37,7 @@ from pipeline.stopwatch import Stopwatch
 
 APPLICATION = "softgrip"
 NO_ROOM_BYTES = 1 << 20  # less free space is a full disk
+SHEET_SPACING = 3.0  # between clouds that are shown side by side, in r_G: they are 2.4 wide
 LARGEST_MB = 200  # what a viewer still opens in seconds; [recording] of run.toml keeps below it
 ROOTS = ("world", "camera", "curves", "notes")
 TIMELINES = {

@@ -16,7 +16,13 @@ from pipeline.labelling.balancing import TENTHS, quality_histogram
 from pipeline.messages.samples import read_samples, samples_of
 from pipeline.network.samples import SPLITS, Samples, join_samples
 from pipeline.recording import colours
-from pipeline.recording.recording import FinishedStage, eye_at, recording, time_panel
+from pipeline.recording.recording import (
+    SHEET_SPACING,
+    FinishedStage,
+    eye_at,
+    recording,
+    time_panel,
+)
 from pipeline.spread import choose_evenly
 from schemas.softgrip.v1.samples_pb2 import SampleBatch
 
@@ -24,7 +30,6 @@ TIMELINE = "sample"
 # Clouds are chosen of so many samples: shuffled, they stand for all, and they fit in memory.
 SHOWN_OF = 4096
 SHEET_COLUMNS = 10  # clouds in a row of the sheet
-SHEET_SPACING = 3.0  # in r_G: clouds are 2.4 wide
 CELL_RADIUS = 0.04  # a cell is drawn as a ball of this size, in r_G
 
 

@@ -18,6 +18,7 @@ from pipeline.network.resuming import EpochMetrics
 from pipeline.network.samples import Samples
 from pipeline.recording import colours
 from pipeline.recording.recording import (
+    SHEET_SPACING,
     FinishedStage,
     eye_at,
     name_curve,
@@ -30,7 +31,6 @@ from schemas.softgrip.v1.training_pb2 import Epoch, TrainingResult
 TIMELINE = "epoch"
 SHEET_COLUMNS = 6  # clouds in a row of the sheet
 SHEET_SAMPLES = 24  # as many as can be looked at one by one
-SHEET_SPACING = 3.0  # in r_G: clouds are 2.4 wide
 SCATTER_POINTS = 5000  # more hide each other in the plot
 
 
