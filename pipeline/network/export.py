@@ -2,11 +2,8 @@
 
 import copy
 import json
-import logging
 import math
-import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 
 import onnx
@@ -18,12 +15,12 @@ from torch import Tensor, nn
 from pipeline.errors import ContentError
 from pipeline.network.canonical import KNOWN_CHANNELS, Channels
 from pipeline.network.ga_cnn import GaCnn
+from pipeline.network.traced import optimized_graph, strip_origins
 
 FORMAT = "softgrip.ga-cnn.onnx"
 FORMAT_VERSION = 1  # rises where an older reader would misread an export
 REMEDY = "Export the network again."
 
-_INPUT, _OUTPUT = "inputs", "quality"
 # All that a GA-CNN is exported to: nothing that makes large arrays of small ones.
 _OPERATORS = frozenset(
     (
@@ -55,6 +52,9 @@ class ExportedInput:
 def export_onnx_bytes(network: GaCnn, cells: int) -> bytes:
     """Export a network as ONNX for canonical inputs of any batch; equal networks give equal bytes.
 
+    A network of this shape is traced once and its graph kept, see `pipeline.network.traced`; what
+    the weights decide, such as the folding of norms into convolutions, is done each time.
+
     Parameters
     ----------
     network
@@ -64,23 +64,12 @@ def export_onnx_bytes(network: GaCnn, cells: int) -> bytes:
 
     Returns
     -------
-    The bytes.
+    The bytes, those that the exporter makes of the network in one go.
     """
-    example = torch.zeros(2, len(network.channels), cells, cells)
     network = _without_matrix_products(network).eval()
     network = network.to(memory_format=torch.contiguous_format)  # type: ignore[call-overload]
-    with _quiet_exporter():
-        program = torch.onnx.export(
-            network,
-            (example,),
-            dynamo=True,
-            dynamic_shapes=({0: torch.export.Dim("batch")},),
-            input_names=[_INPUT],
-            output_names=[_OUTPUT],
-            verbose=False,
-        )
-    model = program.model_proto  # type: ignore[union-attr]
-    _strip_origins(model)
+    model = optimized_graph(network, cells)
+    strip_origins(model)
     for key, value in _metadata(network.channels).items():
         model.metadata_props.add(key=key, value=value)
     data: bytes = model.SerializeToString(deterministic=True)
@@ -218,31 +207,3 @@ def _metadata(channels: Channels) -> dict[str, str]:
         "version": str(FORMAT_VERSION),
         "channels": json.dumps(channels),
     }
-
-
-def _strip_origins(model: onnx.ModelProto) -> None:
-    """Remove the traces of source files that the exporter leaves: they differ by machine."""
-    del model.metadata_props[:]
-    del model.graph.metadata_props[:]
-    model.doc_string = model.graph.doc_string = ""
-    for node in model.graph.node:
-        del node.metadata_props[:]
-        node.doc_string = ""
-    for value in model.graph.value_info:
-        del value.metadata_props[:]
-    for weights in model.graph.initializer:
-        del weights.metadata_props[:]
-
-
-@contextmanager
-def _quiet_exporter() -> Iterator[None]:
-    """Without the exporter's remarks on optional packages that are not used here."""
-    logger = logging.getLogger("torch.onnx")
-    level = logger.level
-    logger.setLevel(logging.ERROR)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
-    finally:
-        logger.setLevel(level)
