@@ -114,7 +114,7 @@ def check_expectations(
         with few_rows(questions, stage, artifacts, cache_folder) as few:
             if few is not None:
                 return [held(one, few.number(one.sql)) for one in declared]
-    from pipeline.asking.query import open_tables  # loads DuckDB, a tenth of a short stage
+    from pipeline.asking.query import open_tables  # loads DuckDB, most of a check
 
     makers = None if asked else [stage]  # to read an index takes 2 ms, and a run has six
     with open_tables(artifacts, cache_folder, stage, makers) as tables:
