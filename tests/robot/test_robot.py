@@ -271,7 +271,7 @@ def test_a_cell_without_a_pressure_sensor_has_no_pressure(tmp_path: Path) -> Non
 
 
 def test_a_policy_that_there_is_not_is_told(cell: Cell, tmp_path: Path) -> None:
-    with pytest.raises(typer.BadParameter, match="closed-loop, analytic, uncorrected"):
+    with pytest.raises(typer.BadParameter, match="closed-loop, network, analytic, uncorrected"):
         robot(EXAMPLE, cell[0], policy="best", run="ci", out=tmp_path)
 
 
