@@ -10,7 +10,7 @@ def build_strategy(name: PolicyName, predict: Predict, config: RunConfig) -> Str
     """Build one of the policies that are compared.
 
     - closed-loop: takes several views, corrects its aim on the way, and reacts to the wrench.
-    - network: the same, rated by the network alone where `policy.analytic_share` joins both.
+    - network: the same, but the network alone rates grasps, whatever `policy.analytic_share` says.
     - analytic: the same with the analytic label on the measured cloud in place of the network.
     - uncorrected: closed-loop without corrections.
     - one-seal: the same as closed-loop without a second seal.

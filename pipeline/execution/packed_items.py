@@ -12,7 +12,7 @@ from typing import Any
 
 from pipeline.config import RunConfig
 
-_CONFIGURATIONS = 2  # kept in a worker: a stage has one, evaluation's jobs a few
+_CONFIGURATIONS = 2  # kept in a worker: the items of a stage hold one
 
 
 class ItemPacker:
@@ -63,6 +63,6 @@ def unpack_item(data: bytes) -> Any:
 
 @lru_cache(maxsize=_CONFIGURATIONS)
 def configuration(data: bytes) -> RunConfig:
-    """A configuration of its pickle; it is frozen, so that items may share it."""
+    """The configuration of these bytes; it is frozen, so that items may share it."""
     config: RunConfig = pickle.loads(data)  # noqa: S301 - our own bytes
     return config

@@ -123,7 +123,7 @@ def _with_weights(data: bytes, state: Mapping[str, Tensor]) -> onnx.ModelProto:
 
 
 def _name_a_node(graph: onnx_ir.Graph) -> int:
-    """Let a graph name a node, which does not stay; returns the number in that name."""
+    """Add a node to a graph and take it away, which uses up a number; return that number."""
     node = onnx_ir.Node("", "Identity", inputs=[])
     graph.append(node)
     graph.remove(node)
