@@ -7,7 +7,10 @@ LEAST_S = 1e-3  # a driver is never free, whatever its clock finds
 
 
 class DriverClock:
-    """Tells a driver's start from what each result costs it.
+    """Tells a driver's start and end from what each result costs it.
+
+    Workers wait for the driver while it plans and while it ends a stage. How many of them it keeps
+    busy is decided in between.
 
     Parameters
     ----------
@@ -19,7 +22,7 @@ class DriverClock:
 
     def __init__(self, began: float, has_workers: bool) -> None:
         self._began, self._has_workers = began, has_workers
-        self._first = began
+        self._first = self._last = began
         self._start_s = 0.0
         self._results = 0
         self._workers_s = 0.0
@@ -42,8 +45,9 @@ class DriverClock:
         if here_s is None:
             here_s = 0.0 if self._has_workers else spent_s
         self._results += 1
+        self._last = time.process_time()
         if self._results == 1:  # by now jobs are planned, processes started and given work
-            self._first = time.process_time()
+            self._first = self._last
             self._start_s = self._first - self._began - here_s
         elif spent_s:
             self._workers_s += spent_s
@@ -51,7 +55,7 @@ class DriverClock:
             self._made += made
 
     def cost(self, of: str = "grasps") -> dict[str, float]:
-        """The driver's start, and what the results after the first cost it, until now.
+        """What the driver spent until now: before, between and after the results.
 
         Parameters
         ----------
@@ -60,11 +64,21 @@ class DriverClock:
 
         Returns
         -------
-        `driver_start_s` [s] and what `driver_cost` tells; nothing where there are no such results.
+        `driver_start_s` until the first result and `driver_end_s` since the last one [s], and what
+        `driver_cost` tells of the time between these two; nothing where no result came after the
+        first.
         """
-        spent_s = time.process_time() - self._first - self._here_s
-        cost = driver_cost(spent_s, self._workers_s, self._made, of)
-        return {"driver_start_s": round(self._start_s, 4), **cost} if cost else {}
+        cost = driver_cost(
+            self._last - self._first - self._here_s, self._workers_s, self._made, of
+        )
+        if not cost:
+            return {}
+        end_s = time.process_time() - self._last
+        return {
+            "driver_start_s": round(self._start_s, 4),
+            **cost,
+            "driver_end_s": round(end_s, 4),
+        }
 
 
 def driver_cost(
@@ -75,7 +89,7 @@ def driver_cost(
     Parameters
     ----------
     driver_s
-        The driver's own processor time [s].
+        The driver's own processor time while results came [s].
     workers_s
         Processor time of the work items, wherever they were made [s].
     made

@@ -18,10 +18,10 @@ def test_of_nothing_made_nothing_is_said() -> None:
 
 
 @pytest.mark.parametrize(("has_workers", "of_driver"), [(True, 2.0), (False, 0.5)])
-def test_the_start_is_told_apart_and_work_in_the_driver_s_process_is_not_the_driver_s(
+def test_start_and_end_are_told_apart_and_work_in_the_driver_s_process_is_not_the_driver_s(
     monkeypatch: pytest.MonkeyPatch, has_workers: bool, of_driver: float
 ) -> None:
-    seen = iter([14.0, 16.0])  # at the first result, and at the end
+    seen = iter([14.0, 15.8, 16.0, 16.7])  # at three results, and at the end
     monkeypatch.setattr(time, "process_time", lambda: next(seen))
     clock = DriverClock(10.0, has_workers)
     clock.book(3.0, 500)
@@ -31,12 +31,13 @@ def test_the_start_is_told_apart_and_work_in_the_driver_s_process_is_not_the_dri
     assert cost["driver_start_s"] == pytest.approx(4.0 if has_workers else 1.0)
     assert cost["driver_s_per_1000_grasps"] == pytest.approx(of_driver)
     assert cost["nodes_one_driver_feeds"] == pytest.approx(1.5 / of_driver / 8, abs=0.05)
+    assert cost["driver_end_s"] == pytest.approx(0.7)
 
 
 def test_of_a_scene_the_driver_may_have_rendered_a_part_itself(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    seen = iter([14.0, 16.0])
+    seen = iter([14.0, 16.0, 16.5])
     monkeypatch.setattr(time, "process_time", lambda: next(seen))
     clock = DriverClock(10.0, has_workers=True)
     clock.book(3.0, 1, here_s=2.5)
