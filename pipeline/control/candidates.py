@@ -6,10 +6,10 @@ average surface normal.
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from pipeline.compiled_code import njit
 from pipeline.control.cloud import Cloud
 from pipeline.labelling.sampling import contact_frames
 
@@ -206,7 +206,7 @@ def _no_steeper(normals: Float[np.ndarray, "k 3"], tilt_max_rad: float) -> Float
     return np.column_stack([raised[:, None] * normals[:, :2], up])
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _neighbourhoods(
     points: Float[np.ndarray, "n 3"], at: Float[np.ndarray, "k 3"], radius: float
 ) -> tuple[Int[np.ndarray, " k"], Float[np.ndarray, "k 3"], Float[np.ndarray, "k 3 3"]]:

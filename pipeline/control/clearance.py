@@ -1,9 +1,9 @@
 """Which gripper poses would make its rigid stem collide with measured points."""
 
-import numba
 import numpy as np
 from jaxtyping import Bool, Float
 
+from pipeline.compiled_code import njit
 from pipeline.config.evaluation import HandConfig
 
 
@@ -39,7 +39,7 @@ def free_of_collision(
     )
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _free(
     poses: Float[np.ndarray, "k 4 4"],
     points: Float[np.ndarray, "n 3"],

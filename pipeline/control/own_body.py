@@ -2,10 +2,10 @@
 
 from dataclasses import replace
 
-import numba
 import numpy as np
 from jaxtyping import Float
 
+from pipeline.compiled_code import njit
 from pipeline.config.evaluation import HandConfig
 from pipeline.config.grasps import PadConfig
 from pipeline.control.cloud import DepthPicture
@@ -52,7 +52,7 @@ def cut_gripper_out(
     return replace(picture, depth_m=depth_m)
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _cut(
     depth: Float[np.ndarray, "h w"],
     x: Float[np.ndarray, " w"],

@@ -68,9 +68,7 @@ class DriverClock:
         `driver_cost` tells of the time between these two; nothing where no result came after the
         first.
         """
-        cost = driver_cost(
-            self._last - self._first - self._here_s, self._workers_s, self._made, of
-        )
+        cost = driver_cost(self._last - self._first - self._here_s, self._workers_s, self._made, of)
         if not cost:
             return {}
         end_s = time.process_time() - self._last

@@ -4,12 +4,13 @@ SciPy's rotations check and convert what they are given, which costs some 200 µ
 neither. Rotation matrices must be proper.
 """
 
-import numba
 import numpy as np
 from jaxtyping import Float
 
+from pipeline.compiled_code import njit
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+
+@njit()
 def quaternion_of(rotation: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, " 4"]:
     """Unit quaternion wxyz with w >= 0, from the largest of its components (Shepperd, 1978)."""
     trace = rotation[0, 0] + rotation[1, 1] + rotation[2, 2]
@@ -34,7 +35,7 @@ def quaternion_of(rotation: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, " 4"]
     return q
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def pose_of(
     position_m: Float[np.ndarray, " 3"], quaternion_wxyz: Float[np.ndarray, " 4"]
 ) -> Float[np.ndarray, "4 4"]:
@@ -60,7 +61,7 @@ def pose_of(
     return pose
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def turn_between(
     world_from_a: Float[np.ndarray, "4 4"], world_from_b: Float[np.ndarray, "4 4"]
 ) -> Float[np.ndarray, " 3"]:
@@ -77,7 +78,7 @@ def turn_between(
     return turn_rad
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def turned(
     world_from_a: Float[np.ndarray, "4 4"], turn_rad: Float[np.ndarray, " 3"]
 ) -> Float[np.ndarray, "4 4"]:
@@ -96,7 +97,7 @@ def turned(
     return pose
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def cross_product(
     a: Float[np.ndarray, " 3"], b: Float[np.ndarray, " 3"]
 ) -> Float[np.ndarray, " 3"]:

@@ -1,21 +1,16 @@
-"""The one way functions of this package are compiled to machine code.
-
-A compiled function may call only compiled functions of its own module:
-numba's disk cache looks at the date of the caller's file alone, so a call
-across modules could run an outdated callee.
-"""
+"""The one way functions of this package are compiled to machine code."""
 
 from collections.abc import Callable
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
-import numba
+from pipeline.compiled_code import njit
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def compiled(function: Function) -> Function:
     """Compile with IEEE arithmetic: NaN and -inf heights keep their meaning."""
-    return cast(Function, numba.njit(cache=True, error_model="numpy")(function))
+    return njit(error_model="numpy")(function)
 
 
 def compiled_finite(function: Function) -> Function:
@@ -25,5 +20,4 @@ def compiled_finite(function: Function) -> Function:
     which of both runs would depend on whether the disk cache was warm. So would the last bits.
     """
     flags = {"reassoc", "contract", "nsz", "nnan"}
-    compile_it = numba.njit(cache=True, error_model="numpy", fastmath=flags, forceinline=True)
-    return cast(Function, compile_it(function))
+    return njit(error_model="numpy", fastmath=flags, forceinline=True)(function)

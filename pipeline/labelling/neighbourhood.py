@@ -5,9 +5,10 @@ cells around. They are added in the order of their indices, which is the order o
 pixels: the sums have the bits that any other search adds up to in that order.
 """
 
-import numba
 import numpy as np
 from jaxtyping import Float, Int
+
+from pipeline.compiled_code import njit
 
 # Cells along the longest side of the points: bounds the memory of cells where the radius is small.
 _MOST_CELLS = 64
@@ -38,7 +39,7 @@ def sums_within(
     -------
     Sums, shape (k, 3), and how many points each is of, shape (k,).
     """
-    return _sums_within(  # type: ignore[no-any-return]
+    return _sums_within(
         np.ascontiguousarray(points_m),
         np.ascontiguousarray(values),
         np.ascontiguousarray(around_m),
@@ -46,7 +47,7 @@ def sums_within(
     )
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _sums_within(
     points: Float[np.ndarray, "n 3"],
     values: Float[np.ndarray, "n 3"],

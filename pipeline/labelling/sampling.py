@@ -16,11 +16,11 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 from functools import cached_property
 
-import numba
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.spatial import cKDTree
 
+from pipeline.compiled_code import njit
 from pipeline.config.grasps import GraspsConfig
 from pipeline.labelling.neighbourhood import sums_within
 from pipeline.read_only import read_only
@@ -327,7 +327,7 @@ def tangents(
     return frames[:, :3, 0], frames[:, :3, 1]
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(error_model="numpy")
 def _frames(
     contacts: Float[np.ndarray, "n 3"],
     normals: Float[np.ndarray, "n 3"],
@@ -358,7 +358,7 @@ def _frames(
     return frames
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(error_model="numpy")
 def _cosines(
     points: Float[np.ndarray, "n 3"],
     directions: Float[np.ndarray, "n 3"],

@@ -10,7 +10,6 @@ from collections.abc import Iterable, Iterator
 from functools import lru_cache
 from typing import TypeVar
 
-import numba
 import numpy as np
 from google.protobuf.message import Message
 from jaxtyping import Bool, Float, Float16, Int8, Int16, UInt16
@@ -19,6 +18,7 @@ from pipeline.artifacts.bounds import MOST_CHUNK_BYTES
 from pipeline.artifacts.reading import Artifact
 from pipeline.artifacts.tensors import tensors_of, to_tensor
 from pipeline.artifacts.writing import ArtifactWriter
+from pipeline.compiled_code import njit
 from pipeline.config.grasps import CELL_SIDE
 from pipeline.errors import ArtifactError, ContentError
 from schemas.softgrip.v1.clouds_pb2 import CloudBatch
@@ -273,7 +273,7 @@ def _tables(
         return heights.astype(np.float16), places.astype(np.float16)
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _in_steps(
     cloud: Float[np.ndarray, "n g g 3"], mask: Bool[np.ndarray, "n g g"], cell: float
 ) -> tuple[Int16[np.ndarray, " s"], Int8[np.ndarray, "2 s"], bool]:
@@ -310,7 +310,7 @@ def _in_steps(
     return height, in_cell, True
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _out_of_steps(
     height: Int16[np.ndarray, " s"],
     in_cell: Int8[np.ndarray, "2 s"],

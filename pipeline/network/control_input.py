@@ -7,10 +7,10 @@ them reads and writes all of memory; here a cloud stays in the cache from first 
 import math
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from jaxtyping import Bool, Float
 
+from pipeline.compiled_code import njit
 from pipeline.config.grasps import CELL_SIDE
 from pipeline.network.canonical import (
     CHANNELS,
@@ -29,11 +29,7 @@ _X, _Y, _X_IN_CELL, _Y_IN_CELL, _Z, _Z_FINE, _RADIUS, _SEEN, _PAD_GAP, _PAD_CONT
 
 
 class _Lengths(NamedTuple):
-    """Lengths of other modules, in single precision, as the tensors are.
-
-    They are arguments, as numba's disk cache would keep the value that a constant of another module
-    had when the function was compiled.
-    """
+    """Lengths of other modules, in single precision, as the tensors are."""
 
     beside: np.float32 = np.float32(CELL_SIDE)
     across: np.float32 = np.float32(math.sqrt(2.0) * CELL_SIDE)
@@ -74,7 +70,7 @@ def control_input(
     return inputs
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)  # type: ignore[untyped-decorator]
+@njit(error_model="numpy", nogil=True)
 def _fill(
     cloud: Float[np.ndarray, "b h w 3"],
     mask: Bool[np.ndarray, "b h w"],
@@ -121,7 +117,7 @@ def _fill(
                     out[_PAD_CONTACT, i, j] = 1.0 if gap <= lengths.contact_gap else 0.0
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)  # type: ignore[untyped-decorator]
+@njit(error_model="numpy", nogil=True)
 def _carry(
     z: Float[np.ndarray, "h2 w2"], carried: Float[np.ndarray, "h2 w2"], lengths: _Lengths
 ) -> None:
@@ -135,7 +131,7 @@ def _carry(
             carried[i, j] = max(z[i, j], max(beside - lengths.beside, corner - lengths.across))
 
 
-@numba.njit(cache=True, error_model="numpy", nogil=True)  # type: ignore[untyped-decorator]
+@njit(error_model="numpy", nogil=True)
 def _reference_height(
     z: Float[np.ndarray, "h w"], seen: Bool[np.ndarray, "h w"], part: int
 ) -> np.float32:

@@ -4,11 +4,11 @@ import colorsys
 from collections.abc import Sequence
 from functools import lru_cache
 
-import numba
 import numpy as np
 import sapien
 from jaxtyping import Float, Int, Integer
 
+from pipeline.compiled_code import njit
 from pipeline.geometry.mesh import Mesh
 
 _TABLE_COLOUR = (0.52, 0.51, 0.49, 1.0)  # a grey that no object has
@@ -80,7 +80,7 @@ def crease_normals(mesh: Mesh) -> Float[np.ndarray, "m 3 3"]:
     )
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _corner_normals(
     faces: Int[np.ndarray, "m 3"],
     doubled: Float[np.ndarray, "m 3"],

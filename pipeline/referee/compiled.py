@@ -5,10 +5,10 @@ search tries; the film by conjugate gradients with an incomplete Cholesky factor
 what the last call found. Held to the plain ways by tests.
 """
 
-import numba
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from pipeline.compiled_code import njit
 from pipeline.referee.disc import Disc
 from pipeline.referee.foundation import Cushion, Pressed
 from pipeline.referee.leak import (
@@ -103,7 +103,7 @@ def leak(
     return Vacuum(under, vacuum_pa, flow)
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _pressed(
     starts: Int[np.ndarray, " n+1"],
     neighbours: Int[np.ndarray, " e"],
@@ -174,7 +174,7 @@ def _pressed(
     return face, back
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _carried(
     starts: Int[np.ndarray, " n+1"],
     neighbours: Int[np.ndarray, " e"],
@@ -209,7 +209,7 @@ def _carried(
     return total
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _pushes(
     starts: Int[np.ndarray, " n+1"],
     neighbours: Int[np.ndarray, " e"],
@@ -226,7 +226,7 @@ def _pushes(
     return pushes
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _drawn(
     starts: Int[np.ndarray, " n+1"],
     neighbours: Int[np.ndarray, " e"],
@@ -270,7 +270,7 @@ def _drawn(
     return under, vacuum, flow
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _working_point(vacuum: float, flow: float, exponent: float, conductance: float) -> float:
     """As `pump.working_point`, by halving."""
     low, high = 0.0, min(vacuum, flow / max(conductance, 1e-300))
@@ -285,7 +285,7 @@ def _working_point(vacuum: float, flow: float, exponent: float, conductance: flo
     return 0.5 * (low + high)
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _factorised(
     starts: Int[np.ndarray, " n+1"],
     neighbours: Int[np.ndarray, " e"],
@@ -324,7 +324,7 @@ def _factorised(
         pivots[i] = pivot
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _film_solved(
     starts: Int[np.ndarray, " n+1"],
     neighbours: Int[np.ndarray, " e"],
@@ -364,7 +364,7 @@ def _film_solved(
             step[i] = better[i] + product / before * step[i]
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _multiplied(
     starts: Int[np.ndarray, " n+1"],
     neighbours: Int[np.ndarray, " e"],
@@ -384,7 +384,7 @@ def _multiplied(
         image[i] = total
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _improved(
     starts: Int[np.ndarray, " n+1"],
     neighbours: Int[np.ndarray, " e"],

@@ -6,10 +6,10 @@ at every picture. It is the camera of the closed loop, where a picture must take
 
 from dataclasses import replace
 
-import numba
 import numpy as np
 from jaxtyping import Float, Integer
 
+from pipeline.compiled_code import njit
 from pipeline.geometry.transforms import invert, transform_points
 from pipeline.sensing.depth_noise import disturb
 from pipeline.world.cameras import PinholeCamera, picture_rays, project_local
@@ -99,7 +99,7 @@ def _exact(camera: PinholeCamera, scene: Surfaces) -> CameraView:
     )
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _seen(
     rays: Float[np.ndarray, "n 3"],
     distance: Float[np.ndarray, " n"],

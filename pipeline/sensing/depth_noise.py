@@ -17,11 +17,11 @@ two lenses. Angles beyond those of the frames, and transparent objects, are our 
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 from scipy import ndimage
 
+from pipeline.compiled_code import njit
 from pipeline.config.cameras import DepthSensor
 from pipeline.world.cameras import pixel_slopes
 from pipeline.world.view import CameraView
@@ -174,7 +174,7 @@ def cosine_of_incidence(view: CameraView) -> Float[np.ndarray, "h w"]:
     return np.asarray(_cosines(view.normals, x, y))
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _cosines(
     normals: UInt8[np.ndarray, "h w 3"], x: Float[np.ndarray, " w"], y: Float[np.ndarray, " h"]
 ) -> Float[np.ndarray, "h w"]:

@@ -6,9 +6,10 @@ whose depths may meet it.
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from jaxtyping import Bool, Float, Int
+
+from pipeline.compiled_code import njit
 
 _TILE = 8  # pixels a side: of tiles beside the box no pixel is looked at
 _ROUNDING_M = 1e-9  # far more than rounding moves a point, far less than a cell
@@ -23,7 +24,7 @@ class _Row(NamedTuple):
     cell: Int[np.ndarray, " w"]
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def tile_depths(
     depth: Float[np.ndarray, "h w"], windows: Int[np.ndarray, "b 4"]
 ) -> tuple[Float[np.ndarray, "th tw"], Float[np.ndarray, "th tw"]]:
@@ -48,7 +49,7 @@ def tile_depths(
     return least, greatest
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def collect_points(
     depth: Float[np.ndarray, "h w"],
     least: Float[np.ndarray, "th tw"],
@@ -131,7 +132,7 @@ def collect_points(
     return first
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _may_meet(
     near: Float[np.ndarray, " tiles"],
     far: Float[np.ndarray, " tiles"],
@@ -167,7 +168,7 @@ def _may_meet(
             inside[tile] = inside[tile] & reaches & begins
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def add_points(
     points: Float[np.ndarray, "most 4"],
     cell_of: Int[np.ndarray, " most"],
@@ -188,7 +189,7 @@ def add_points(
                 of_cell[cell, c] += near * points[at, c]
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def windows_of(
     shape: tuple[int, int],
     intrinsics: Float[np.ndarray, "3 3"],
@@ -224,7 +225,7 @@ def windows_of(
 # contact's axes, R^T (z (u, v, 1) - t), only the term in u changes along a row.
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _origin(pose: Float[np.ndarray, "4 4"]) -> tuple[float, float, float]:
     """R^T t."""
     x, y, z = pose[0, 3], pose[1, 3], pose[2, 3]
@@ -235,7 +236,7 @@ def _origin(pose: Float[np.ndarray, "4 4"]) -> tuple[float, float, float]:
     )
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _of_row(v: float, pose: Float[np.ndarray, "4 4"]) -> tuple[float, float, float]:
     """R^T (0, v, 1) of a row."""
     return (
@@ -245,7 +246,7 @@ def _of_row(v: float, pose: Float[np.ndarray, "4 4"]) -> tuple[float, float, flo
     )
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _place(
     depth: Float[np.ndarray, " k"],
     u: Float[np.ndarray, " k"],
@@ -283,7 +284,7 @@ def _place(
         cell_of[i] = np.int32(row * np.int32(cells) + column) if within else none
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _runs(
     inside: Bool[np.ndarray, " tw"],
     left: int,
@@ -305,7 +306,7 @@ def _runs(
     return count
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def write_means(
     sums: Float[np.ndarray, "block g2 4"],
     radius: float,

@@ -3,10 +3,10 @@
 import math
 from dataclasses import dataclass, replace
 
-import numba
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from pipeline.compiled_code import njit
 from pipeline.config.cameras import (
     CamerasConfig,
     DepthCameraConfig,
@@ -299,7 +299,7 @@ def picture_rays(camera: PinholeCamera) -> Float[np.ndarray, "n 3"]:
     return np.asarray(_picture_rays(x, y, camera.world_from_camera))
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _picture_rays(
     x: Float[np.ndarray, " w"], y: Float[np.ndarray, " h"], pose: Float[np.ndarray, "4 4"]
 ) -> Float[np.ndarray, "n 3"]:
@@ -344,7 +344,7 @@ def points_of_depth(
     return points, rows, columns
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _unprojected(
     depth: Float[np.ndarray, "h w"],
     x: Float[np.ndarray, " w"],

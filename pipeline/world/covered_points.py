@@ -10,10 +10,10 @@ Arrays of lanes are flat: sixteen numbers for the sixteen triangles, then sixtee
 Of arrays with rows the compiler does not know that they lie apart, and uses no SIMD lanes.
 """
 
-import numba
 import numpy as np
 from jaxtyping import Float, Int
 
+from pipeline.compiled_code import njit
 from pipeline.world.point_cells import CELLS
 from pipeline.world.triangle_blocks import LANES
 
@@ -31,7 +31,7 @@ _LANE_OF[[(1 << lane) % 19 for lane in range(LANES)]] = np.arange(LANES)
 _at = np.uint64
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(error_model="numpy")
 def place_triangles(
     corners: Float[np.ndarray, " 144"],
     turn: Float[np.ndarray, "3 4"],
@@ -85,7 +85,7 @@ def place_triangles(
         edges[8 * LANES + k] = slack - (n_x * a_x + n_y * a_y)
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(error_model="numpy")
 def around_block(
     rectangle: Float[np.ndarray, " 64"],
     edges: Float[np.ndarray, " 160"],
@@ -114,7 +114,7 @@ def around_block(
     cells[3 * LANES] = np.int32(max(min(high, CELLS - 1.0), -1.0) + 1.0)
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(error_model="numpy")
 def near_points(
     edges: Float[np.ndarray, " 160"],
     cells: Int[np.ndarray, " 64"],
@@ -140,7 +140,7 @@ def near_points(
 
 
 # Sums in any order and fused products are safe here: bounds have room, and lanes' bits are exact.
-@numba.njit(cache=True, error_model="numpy", fastmath={"contract", "reassoc", "nsz"})  # type: ignore[untyped-decorator]
+@njit(error_model="numpy", fastmath={"contract", "reassoc", "nsz"})
 def _may_cover(edges: Float[np.ndarray, " 160"], x: float, y: float, height: float) -> np.uint32:
     """Lanes whose triangle may cover a point and may be higher there, one bit for each."""
     lanes, nought = np.float32(0.0), np.float32(0.0)
@@ -155,7 +155,7 @@ def _may_cover(edges: Float[np.ndarray, " 160"], x: float, y: float, height: flo
     return np.uint32(np.int32(lanes))
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(error_model="numpy")
 def pairs_of(
     found_at: Int[np.ndarray, " more"],
     found_lanes: Int[np.ndarray, " more"],
@@ -176,7 +176,7 @@ def pairs_of(
     return pairs
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(error_model="numpy")
 def heights_on(
     seen: Float[np.ndarray, " 144"],
     x: Float[np.ndarray, " v"],

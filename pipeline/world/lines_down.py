@@ -8,10 +8,10 @@ points that it covers (`covered_points`). Both sides of a triangle count, as for
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from jaxtyping import Float, Int
 
+from pipeline.compiled_code import njit
 from pipeline.world.covered_points import (
     SINGLE,
     around_block,
@@ -119,7 +119,7 @@ def _arguments(
     )
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(error_model="numpy")
 def _are_poses(frames: Float[np.ndarray, "n 4 4"]) -> bool:
     """Whether all frames are finite and turn without scaling."""
     for f in frames:
@@ -134,7 +134,7 @@ def _are_poses(frames: Float[np.ndarray, "n 4 4"]) -> bool:
     return True
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(error_model="numpy")
 def _measure(
     frames: Float[np.ndarray, "n 4 4"], top: float, height: Float[np.ndarray, "n v"]
 ) -> None:
@@ -146,7 +146,7 @@ def _measure(
             height[row, i] = top - (top - height[row, i]) * length
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(error_model="numpy")
 def _draw(
     tree: tuple[np.ndarray, ...],
     whole: tuple[np.ndarray, float, int],
@@ -230,7 +230,7 @@ def _draw(
                     body[point] = number
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(error_model="numpy")
 def _frame_from_body(
     f: Float[np.ndarray, "4 4"], pose: Float[np.ndarray, "4 4"]
 ) -> Float[np.ndarray, "3 4"]:
@@ -256,7 +256,7 @@ def _frame_from_body(
     return turn
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(error_model="numpy")
 def _hidden(
     rows: Int[np.ndarray, "cells more"],
     cells: Int[np.ndarray, " 4"],
@@ -271,7 +271,7 @@ def _hidden(
     return True
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(error_model="numpy")
 def _points_in(within: Int[np.ndarray, "more more"], cells: Int[np.ndarray, " 64"], k: int) -> int:
     """Points in the rectangle of cells of lane k; 0 where the rectangle is empty."""
     left, right, low, high = (
@@ -285,7 +285,7 @@ def _points_in(within: Int[np.ndarray, "more more"], cells: Int[np.ndarray, " 64
     return int(within[high, right] - within[low, right] - within[high, left] + within[low, left])
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(error_model="numpy")
 def _place_children(
     boxes: Float[np.ndarray, " 96"],
     turn: Float[np.ndarray, "3 4"],

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from functools import lru_cache
 
-import numba
 import numpy as np
 from jaxtyping import Float, Int
 
+from pipeline.compiled_code import njit
 from pipeline.read_only import read_only
 
 # Cells a side of the square around the points: some 2 mm for the pad of Table I. More cells cost
@@ -85,7 +85,7 @@ def _cells_of(points: bytes) -> PointCells:
     )
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(error_model="numpy")
 def _sorted_into_cells(
     points: Float[np.ndarray, "v 2"],
 ) -> tuple[

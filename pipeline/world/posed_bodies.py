@@ -9,10 +9,10 @@ from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from types import MappingProxyType
 
-import numba
 import numpy as np
 from jaxtyping import Float, Int
 
+from pipeline.compiled_code import njit
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.transforms import invert, transform_points
 from pipeline.world.raycasting import RayHits, RayScene, RestingBody
@@ -147,7 +147,7 @@ def _own_scene(mesh: Mesh) -> tuple[RayScene, Float[np.ndarray, " 3"], float]:
     return RayScene([mesh]), centre, radius * (1 + 1e-6)
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _table_hits(
     origins: Float[np.ndarray, "n 3"], rays: Float[np.ndarray, "n 3"], half: float
 ) -> tuple[Float[np.ndarray, " n"], Int[np.ndarray, " n"]]:
@@ -165,7 +165,7 @@ def _table_hits(
     return distance, body
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _meeting(
     origins: Float[np.ndarray, "n 3"],
     rays: Float[np.ndarray, "n 3"],
@@ -189,7 +189,7 @@ def _meeting(
     return found[:count]
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _in_frame(
     frame_from_world: Float[np.ndarray, "4 4"],
     origins: Float[np.ndarray, "n 3"],
@@ -211,7 +211,7 @@ def _in_frame(
     return moved, turned
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _take_nearer(
     rows: Int[np.ndarray, " k"],
     hit_m: Float[np.ndarray, " k"],
@@ -230,7 +230,7 @@ def _take_nearer(
             triangle[i] = hit_triangle[k]
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _turned(
     pose: Float[np.ndarray, "4 4"], vectors: Float[np.ndarray, "k 3"]
 ) -> Float[np.ndarray, "k 3"]:

@@ -4,12 +4,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
-import numba
 import numpy as np
 from embreex import rtcore_scene
 from embreex.mesh_construction import TriangleMesh
 from jaxtyping import Bool, Float, Int
 
+from pipeline.compiled_code import njit
 from pipeline.geometry.mesh import Mesh
 
 # Embree works in float32. The scene is moved to the origin and scaled to this size, so that neither
@@ -227,7 +227,7 @@ class RayScene:
         return np.asarray(self._embree.run(origins, rays), dtype=np.int64)
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _prepared(
     origins: Float[np.ndarray, "n 3"],
     rays: Float[np.ndarray, "n 3"],
@@ -251,7 +251,7 @@ def _prepared(
     return unit, near, along, sound
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(error_model="numpy")
 def _normals(
     corners: Float[np.ndarray, "m 3 3"],
     body: Int[np.ndarray, " n"],
@@ -272,7 +272,7 @@ def _normals(
     return normals
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _named(
     face: Int[np.ndarray, " n"],
     body_of_face: Int[np.ndarray, " m"],
@@ -287,7 +287,7 @@ def _named(
     return body, triangle
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _plane_distances(
     corners: Float[np.ndarray, "m 3 3"],
     face: Int[np.ndarray, " n"],

@@ -8,10 +8,10 @@ tested in SIMD lanes.
 from dataclasses import dataclass
 from functools import lru_cache
 
-import numba
 import numpy as np
 from jaxtyping import Float, Int
 
+from pipeline.compiled_code import njit
 from pipeline.geometry.mesh import Mesh
 from pipeline.read_only import read_only
 
@@ -107,7 +107,7 @@ def build_blocks(corners_m: Float[np.ndarray, "m 3 3"]) -> TriangleBlocks:
     )
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(error_model="numpy")
 def _measured(
     corners: Float[np.ndarray, "m 3 3"], long: float
 ) -> tuple[Float[np.ndarray, " 3"], Float[np.ndarray, " 3"], float]:
@@ -131,7 +131,7 @@ def _measured(
     return lower, upper, area / counted if counted else np.inf
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(error_model="numpy")
 def _length(corners: Float[np.ndarray, "3 3"]) -> float:
     """Longest side of the box around a triangle."""
     longest = 0.0
@@ -141,7 +141,7 @@ def _length(corners: Float[np.ndarray, "3 3"]) -> float:
     return longest
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(error_model="numpy")
 def _curve_keys(
     corners: Float[np.ndarray, "m 3 3"], lower: Float[np.ndarray, " 3"], extent: float, long: float
 ) -> Int[np.ndarray, " m"]:
@@ -159,7 +159,7 @@ def _curve_keys(
     return keys
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(error_model="numpy")
 def _hilbert(x: np.int64, y: np.int64, z: np.int64) -> np.int64:
     """Place of a cell on Hilbert's curve in three dimensions (Skilling, 2004)."""
     highest = np.int64(1) << (_BITS - 1)
@@ -193,7 +193,7 @@ def _hilbert(x: np.int64, y: np.int64, z: np.int64) -> np.int64:
     return np.int64(place)
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(error_model="numpy")
 def _spread(number: np.int64) -> np.int64:
     """The number's 16 bits with two zeros before each."""
     number = (number | (number << 16)) & 0x0000FF0000FF
@@ -202,7 +202,7 @@ def _spread(number: np.int64) -> np.int64:
     return (number | (number << 2)) & 0x249249249249
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(error_model="numpy")
 def _sorted_by(keys: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
     """Order that sorts keys of 49 bits, equal ones as they come: by digits, the last first."""
     order, keys = np.arange(len(keys)), keys.copy()
@@ -224,7 +224,7 @@ def _sorted_by(keys: Int[np.ndarray, " m"]) -> Int[np.ndarray, " m"]:
     return order
 
 
-@numba.njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(error_model="numpy")
 def _boxed(
     corners: Float[np.ndarray, "m 3 3"],
     face: Int[np.ndarray, " m"],

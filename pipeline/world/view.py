@@ -2,10 +2,10 @@
 
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from jaxtyping import Float, UInt8, UInt16
 
+from pipeline.compiled_code import njit
 from pipeline.world.cameras import PinholeCamera
 
 
@@ -44,7 +44,7 @@ def normal_map(normals: Float[np.ndarray, "h w 3"]) -> UInt8[np.ndarray, "h w 3"
     return np.asarray(_normal_map(normals))
 
 
-@numba.njit(cache=True)  # type: ignore[untyped-decorator]
+@njit()
 def _normal_map(normals: Float[np.ndarray, "h w 3"]) -> UInt8[np.ndarray, "h w 3"]:
     encoded = np.zeros(normals.shape, dtype=np.uint8)
     for i in range(normals.shape[0]):

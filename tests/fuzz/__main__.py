@@ -17,7 +17,7 @@ INSTRUMENTED = ["pipeline", "mcap", "tomllib", "trimesh", "safetensors"]
 COMPILED = [
     ".".join(file.with_suffix("").parts)
     for file in sorted(Path("pipeline").rglob("*.py"))
-    if "import numba" in file.read_text(encoding="utf-8")
+    if "njit" in (text := file.read_text(encoding="utf-8")) or "gripper.compiled" in text
 ]
 FAILURES = Path("tests/fuzz/failures")
 LONGEST_INPUT_BYTES = 1 << 16

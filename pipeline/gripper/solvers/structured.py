@@ -19,8 +19,7 @@ which also leaves an interior to problems whose F_z cannot vary at all.
 
 `sifting` decides a problem or leaves few of its triangles open; `interior_point` solves for the
 few, and `certificate` says whether that is optimal for all. What is not decided so,
-`interior_point` solves with all triangles. Each module is compiled by itself, so that numba's disk
-cache notices a change of any.
+`interior_point` solves with all triangles.
 """
 
 import numpy as np
