@@ -22,18 +22,18 @@ from pipeline.messages.training import (
     result_message,
 )
 from pipeline.network.checkpoint import save_checkpoint_bytes
-from pipeline.network.control_inference import ControlPredictor, check_export
-from pipeline.network.export import export_onnx_bytes
+from pipeline.network.control_inference import ControlPredictor
+from pipeline.network.export import check_export, export_onnx_bytes
 from pipeline.network.fine_tuning import measure_fine_tuning, starting_network
 from pipeline.network.fitted_baselines import fit_baselines
 from pipeline.network.ga_cnn import parameter_count
-from pipeline.network.held_out import TestFigures, measure_held_out
+from pipeline.network.held_out import measure_held_out
 from pipeline.network.parallel import ALONE, Ranks, join_ranks
-from pipeline.network.resuming import EpochMetrics
 from pipeline.network.samples import Samples
 from pipeline.network.sources import baseline_to_json
 from pipeline.network.timing import runtimes_ms_a_grasp
 from pipeline.network.training import TrainedNetwork, choose_device, train
+from pipeline.network.training_figures import EpochMetrics, TestFigures
 from pipeline.recording.train import draw_train
 from schemas.softgrip.v1.training_pb2 import TrainingResult
 from stages.graph import ATTEMPTS, STARTING_NETWORK, TRAIN, inputs_of
@@ -88,7 +88,9 @@ def build(stage: StageContext, ranks: Ranks = ALONE) -> Summary:
     }
     for name, data in attached.items():
         publish_bytes(stage.folder.path / "train" / name, data)
-    write(stage, trained, result_message(trained, figures, tuned), attached)
+    parameters, best = parameter_count(trained.network), trained.history[trained.best_epoch]
+    result = result_message(config.network, parameters, best, figures, tuned)
+    write(stage, trained, result, attached)
     inference = runtimes_ms_a_grasp(
         trained.network,
         predictor,

@@ -3,8 +3,8 @@
 import os
 
 from pipeline.config.learning import NetworkConfig
-from pipeline.network.control_inference import ControlPredictor, check_export
-from pipeline.network.export import export_onnx_bytes
+from pipeline.network.control_inference import ControlPredictor
+from pipeline.network.export import check_export, export_onnx_bytes
 from pipeline.network.ga_cnn import GaCnn, build_network
 from pipeline.network.samples import Samples
 from pipeline.network.timing import runtimes_ms_a_grasp

@@ -7,12 +7,16 @@ import numpy as np
 from jaxtyping import Float
 
 from pipeline.artifacts.tensors import from_tensor, to_tensor
-from pipeline.network.fine_tuning import FineTuning
+from pipeline.config.learning import NetworkConfig
 from pipeline.network.fitted_baselines import MEAN, BaselineErrors
-from pipeline.network.held_out import CLASSES, TestFigures, error_by_pictures
-from pipeline.network.resuming import EpochMetrics
 from pipeline.network.samples import Samples
-from pipeline.network.training import TrainedNetwork
+from pipeline.network.training_figures import (
+    CLASSES,
+    EpochMetrics,
+    FineTuning,
+    TestFigures,
+    error_by_pictures,
+)
 from schemas.softgrip.v1.training_pb2 import Epoch, TrainingResult
 from schemas.softgrip.v1.training_pb2 import FineTuning as FineTuningMessage
 
@@ -34,15 +38,37 @@ def epoch_message(metrics: EpochMetrics) -> Epoch:
 
 
 def result_message(
-    trained: TrainedNetwork, figures: TestFigures, tuned: FineTuning | None
+    network: NetworkConfig,
+    parameters: int,
+    best: EpochMetrics,
+    figures: TestFigures,
+    tuned: FineTuning | None,
 ) -> TrainingResult:
-    """The message of a finished training; ``tuned`` where it began with a trained network."""
-    config, baselines = trained.network.config, figures.baselines
+    """The message of a finished training.
+
+    Parameters
+    ----------
+    network
+        Layers and channels of the trained network.
+    parameters
+        How many numbers it learned.
+    best
+        The epoch whose weights it has.
+    figures
+        Its errors on held-out objects.
+    tuned
+        What was gained and forgotten where the training began with a trained network.
+
+    Returns
+    -------
+    The message.
+    """
+    baselines = figures.baselines
     return TrainingResult(
-        layers=config.layers,
-        channels=config.channels,
-        parameters=sum(tensor.numel() for tensor in trained.network.parameters()),
-        best_epoch=trained.best_epoch,
+        layers=network.layers,
+        channels=network.channels,
+        parameters=parameters,
+        best_epoch=best.epoch,
         test_mae=figures.mae,
         mean_predictor_mae=baselines.balanced[MEAN],
         baseline_mae=baselines.balanced,
@@ -52,7 +78,7 @@ def result_message(
         calibration=to_tensor(np.array([_numbers(row) for row in figures.calibration])),
         test_quality=to_tensor(figures.quality.astype(np.float32)),
         test_prediction=to_tensor(figures.predicted.astype(np.float32)),
-        val_mae=trained.val_mae,
+        val_mae=best.val_mae,
         test_mae_single=figures.mae_single,
         test_count_by_class=figures.count_by_class,
         train_count=figures.train_count,

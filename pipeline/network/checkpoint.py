@@ -12,8 +12,8 @@ from torch import Tensor
 
 from pipeline.config.learning import NetworkConfig
 from pipeline.errors import ConfigError, ContentError
-from pipeline.network.canonical import CHANNELS, KNOWN_CHANNELS, Channels
 from pipeline.network.ga_cnn import GaCnn, build_network
+from pipeline.network.input_channels import CHANNELS, KNOWN_CHANNELS, Channels
 
 FORMAT = "softgrip.ga-cnn"
 # Rises whenever an older reader would misread the weights or the input's channels.

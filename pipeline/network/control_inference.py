@@ -4,29 +4,17 @@ import sys
 from typing import Any
 
 import numpy as np
-import torch
 from jaxtyping import Bool, Float
 
-from pipeline.errors import ArtifactError, ContentError
-from pipeline.network.canonical import (
-    CHANNELS,
-    SYMMETRIES,
-    apply_symmetry,
-    network_input,
-)
+from pipeline.errors import ContentError
 from pipeline.network.control_input import control_input
-from pipeline.network.export import REMEDY, check_onnx_bytes
-from pipeline.network.ga_cnn import GaCnn
-from pipeline.network.inference import predict
-from pipeline.network.training import reproducible
+from pipeline.network.exported import REMEDY, check_onnx_bytes
+from pipeline.network.input_channels import CHANNELS, SYMMETRIES
 
 # Importing openvino tells Google Analytics and leaves an identifier in the home folder, except
 # where this package is missing.
 sys.modules["openvino_telemetry"] = None  # type: ignore[assignment]
 import openvino  # noqa: E402
-
-# What another runtime may change of a prediction: other orders of summation, no more.
-LARGEST_DIFFERENCE = 1e-4
 
 # Grasps a stream takes at a time. With 4 a grasp costs some 6 % more; with 16 some 4 % less, but
 # two streams are then unequally busy with the 48 candidates of a control step.
@@ -118,63 +106,19 @@ class ControlPredictor:
         """The network's input; for older channels the tensor version, which is slower."""
         if self._channels == CHANNELS:
             return control_input(cloud, mask)
-        with reproducible(threads=1), torch.inference_mode():
-            return network_input(
-                torch.from_numpy(cloud), torch.from_numpy(mask), self._channels
-            ).numpy()
+        # PyTorch takes seconds to import, and only networks of version 0.1.0 need it here.
+        from pipeline.network.tensor_input import tensor_input
+
+        return tensor_input(cloud, mask, self._channels)
 
     def _turned(
         self, part: Float[np.ndarray, "n c h w"], element: int
     ) -> Float[np.ndarray, "n c h w"]:
         """An input under one symmetry of the square; see `apply_symmetry`."""
-        elements = torch.full((len(part),), element)
-        return apply_symmetry(torch.from_numpy(part), elements, self._channels).numpy()
+        # As above: only what measures a network averages; control never does.
+        from pipeline.network.tensor_input import turned_input
 
-
-def check_export(
-    predictor: ControlPredictor,
-    network: GaCnn,
-    cloud: Float[np.ndarray, "n h w 3"],
-    mask: Bool[np.ndarray, "n h w"],
-    batch_size: int,
-    threads: int,
-) -> float:
-    """Largest |q̂ of the export − q̂ of the network| over sample clouds.
-
-    Parameters
-    ----------
-    predictor
-        The exported network.
-    network
-        The network that it was exported from.
-    cloud
-        Points in GCS in units of r_G, shape (n, h, w, 3).
-    mask
-        Cells that hold a measured point, shape (n, h, w).
-    batch_size
-        Clouds that ``network`` predicts at a time.
-    threads
-        Threads that ``network`` runs on.
-
-    Returns
-    -------
-    The difference.
-
-    Raises
-    ------
-    ArtifactError
-        It exceeds 1e-4.
-    """
-    exported = predictor.predict(cloud, mask)
-    expected = predict(network, cloud, mask, batch_size, threads, average_symmetries=False)
-    difference = float(np.abs(exported - expected).max())
-    if not difference <= LARGEST_DIFFERENCE:
-        raise ArtifactError(
-            f"exported network differs from its original by {difference:.2g} in quality, "
-            f"more than {LARGEST_DIFFERENCE:.0e}",
-            REMEDY,
-        )
-    return difference
+        return turned_input(part, element, self._channels)
 
 
 def _compiled(data: bytes, input_shape: tuple[int, ...], threads: int) -> openvino.CompiledModel:

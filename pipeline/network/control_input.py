@@ -12,17 +12,19 @@ from jaxtyping import Bool, Float
 
 from pipeline.compiled_code import njit
 from pipeline.config.grasps import CELL_SIDE
-from pipeline.network.canonical import (
+from pipeline.network.input_channels import (
     CHANNELS,
     CONTACT_GAP,
+    NOTHING,
     PAD_RADIUS,
+    REACH,
     REFERENCE_PART,
+    SWEEPS,
     Z_FINE_LIMIT,
     Z_LIMIT,
 )
-from pipeline.network.measured_drape import NOTHING, REACH, SWEEPS
 
-# In the order of ``canonical.CHANNELS``.
+# In the order of ``input_channels.CHANNELS``.
 _X, _Y, _X_IN_CELL, _Y_IN_CELL, _Z, _Z_FINE, _RADIUS, _SEEN, _PAD_GAP, _PAD_CONTACT = range(
     len(CHANNELS)
 )
@@ -48,7 +50,7 @@ _LENGTHS = _Lengths()
 def control_input(
     cloud: Float[np.ndarray, "b h w 3"], mask: Bool[np.ndarray, "b h w"]
 ) -> Float[np.ndarray, "b c h w"]:
-    """Canonical input of GA-CNN, of ``canonical.CHANNELS``, in single precision.
+    """Canonical input of GA-CNN, of ``input_channels.CHANNELS``, in single precision.
 
     Parameters
     ----------

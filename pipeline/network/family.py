@@ -27,11 +27,11 @@ from torch.utils.flop_counter import FlopCounterMode
 from pipeline.config.learning import NetworkConfig, SweepConfig, TrainConfig
 from pipeline.network.figures import error_by_group, mean_absolute_error
 from pipeline.network.ga_cnn import GaCnn, build_network, parameter_count
-from pipeline.network.held_out import CLASSES
 from pipeline.network.inference import predict
 from pipeline.network.samples import Samples
 from pipeline.network.timing import milliseconds_a_grasp
 from pipeline.network.training import TrainedNetwork
+from pipeline.network.training_figures import CLASSES
 
 CONFIDENCE = 0.95  # that a difference is not of the seeds, as for all intervals here
 

@@ -4,16 +4,12 @@ Forgetting is told on grasps of the released network that lie beside it: on some
 on, which is what it can forget, and on some of its test.
 """
 
-from dataclasses import dataclass
-from typing import Any
-
 import numpy as np
 import torch
 from jaxtyping import Bool, Float
 
 from pipeline.config.learning import NetworkConfig, TrainConfig
 from pipeline.errors import ArtifactError, ConfigError, ContentError
-from pipeline.network.canonical import CHANNELS
 from pipeline.network.checkpoint import (
     load_checkpoint_bytes,
     tensors_from_bytes,
@@ -22,52 +18,16 @@ from pipeline.network.checkpoint import (
 from pipeline.network.figures import mean_absolute_error
 from pipeline.network.ga_cnn import GaCnn
 from pipeline.network.inference import predict
+from pipeline.network.input_channels import CHANNELS
 from pipeline.network.released_files import (
     RELEASED_FOLDER,
     TEST_GRASPS_FILE,
     TRAIN_GRASPS_FILE,
 )
 from pipeline.network.samples import GraspTensors
+from pipeline.network.training_figures import FineTuning
 
 _FORMAT = "softgrip.grasps"
-
-
-@dataclass(frozen=True)
-class FineTuning:
-    """Errors before and after, of one prediction a grasp: mean |q-hat - q|.
-
-    Attributes
-    ----------
-    own_before
-        Of the network that training began with, on the run's test split.
-    own_after
-        Of the trained one, on the same.
-    released_before
-        Of the first, on the released network's test grasps.
-    released_after
-        Of the trained one, on the same.
-    released_grasps
-        How many these are.
-    learnt_before
-        Of the first, on grasps that the released network was trained on; None in older files.
-    learnt_after
-        Of the trained one, on the same; None in older files.
-    learnt_grasps
-        How many these are.
-    """
-
-    own_before: float
-    own_after: float
-    released_before: float
-    released_after: float
-    released_grasps: int
-    learnt_before: float | None = None
-    learnt_after: float | None = None
-    learnt_grasps: int = 0
-
-    def headline(self) -> dict[str, Any]:
-        """The figures by the names that a stage's summary gives them."""
-        return {"fine_tuning": dict(vars(self))}
 
 
 def starting_network(data: bytes, named: str, wanted: NetworkConfig) -> GaCnn:

@@ -14,9 +14,9 @@ from pipeline.network.by_object import ObjectError, errors_by_object, interval_o
 from pipeline.network.figures import mean_absolute_error
 from pipeline.network.fitted_baselines import baseline_errors, fit_baselines
 from pipeline.network.inference import predict
-from pipeline.network.resuming import EpochMetrics
 from pipeline.network.samples import Samples, join_samples
 from pipeline.network.training import train
+from pipeline.network.training_figures import EpochMetrics
 
 ARRAYS = ("quality", "single", "averaged")
 Part = tuple[Sequence[str], Samples]  # names that a fold's samples point into, and the samples

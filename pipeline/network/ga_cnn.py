@@ -45,7 +45,7 @@ from pipeline.config.learning import (
     is_family_depth,
 )
 from pipeline.errors import ConfigError
-from pipeline.network.canonical import CHANNELS, Channels
+from pipeline.network.input_channels import CHANNELS, Channels
 
 STEM_LAYERS = 2  # Supplement IV: a 2-layer CNN of 3x3 comes first
 HEAD_LAYERS = 2  # fully connected layers after the last stage
@@ -217,7 +217,7 @@ def build_network(config: NetworkConfig, seed: int, channels: Channels = CHANNEL
     seed
         Seed of the weights.
     channels
-        Channels of its input, one of ``canonical.KNOWN_CHANNELS``.
+        Channels of its input, one of ``input_channels.KNOWN_CHANNELS``.
 
     Returns
     -------

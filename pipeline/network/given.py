@@ -4,8 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pipeline.errors import ArtifactError, ContentError
-from pipeline.network.checkpoint import load_checkpoint_bytes
-from pipeline.network.export import check_onnx_bytes, export_onnx_bytes
+from pipeline.network.exported import check_onnx_bytes
 from pipeline.network.released_files import EXPORT_FILE, RELEASED, RELEASED_FOLDER
 
 CHECKPOINT_SUFFIX = ".safetensors"
@@ -20,7 +19,7 @@ class GivenNetwork:
     name
         What messages call it.
     exported
-        The network as ONNX, by `export_onnx_bytes`.
+        The network as ONNX, by `export.export_onnx_bytes`.
     """
 
     name: str
@@ -57,6 +56,10 @@ def given_network(named: str, cells: int) -> GivenNetwork:
         ) from error
     try:
         if path.suffix == CHECKPOINT_SUFFIX:
+            # PyTorch takes seconds to import, and an export is read without it.
+            from pipeline.network.checkpoint import load_checkpoint_bytes
+            from pipeline.network.export import export_onnx_bytes
+
             data = export_onnx_bytes(load_checkpoint_bytes(data), cells)
         taken = check_onnx_bytes(data)
     except ContentError as error:

@@ -4,9 +4,10 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float
 
-from pipeline.network.canonical import SYMMETRIES, apply_symmetry, network_input
+from pipeline.network.canonical import apply_symmetry, network_input
 from pipeline.network.ga_cnn import GaCnn
-from pipeline.network.training import reproducible
+from pipeline.network.input_channels import SYMMETRIES
+from pipeline.network.reproducible import reproducible
 
 
 def predict(

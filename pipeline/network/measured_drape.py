@@ -19,12 +19,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from pipeline.config.grasps import CELL_SIDE
-
-# H / r_G of Table I.
-REACH = 1.2
-SWEEPS = round(REACH / CELL_SIDE)
-# Lower than any height that matters, finite so that sums of it stay comparable.
-NOTHING = -1e3
+from pipeline.network.input_channels import NOTHING, REACH, SWEEPS
 
 
 def draped_gap(z: Float[Tensor, "b h w"], seen: Bool[Tensor, "b h w"]) -> Float[Tensor, "b h w"]:

@@ -12,36 +12,9 @@ from pipeline.artifacts.publishing import publish_bytes
 from pipeline.errors import ArtifactError
 from pipeline.network.checkpoint import tensors_from_bytes, tensors_to_bytes
 from pipeline.network.ga_cnn import GaCnn
+from pipeline.network.training_figures import EpochMetrics
 
 STATE_FILE = "training.safetensors"
-
-
-@dataclass(frozen=True)
-class EpochMetrics:
-    """Figures of one epoch.
-
-    Attributes
-    ----------
-    epoch
-        Counted from 0.
-    learning_rate
-        At the epoch's last step.
-    train_loss
-        Mean loss over the epoch's samples, turned and mirrored as in training.
-    train_mae
-        Mean |q̂ − q| over the same.
-    val_mae
-        Mean |q̂ − q| over the validation samples after the epoch.
-    samples
-        Samples seen in the epoch, by all processes together.
-    """
-
-    epoch: int
-    learning_rate: float
-    train_loss: float
-    train_mae: float
-    val_mae: float
-    samples: int
 
 
 @dataclass

@@ -13,10 +13,8 @@ takes, up to rounding.
 import hashlib
 import json
 import math
-import os
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -28,9 +26,10 @@ from torch.nn.parallel import DistributedDataParallel
 
 from pipeline.config.learning import NetworkConfig, TrainConfig
 from pipeline.errors import MachineError
-from pipeline.network.canonical import CHANNELS, SYMMETRIES, apply_symmetry, network_input
+from pipeline.network.canonical import apply_symmetry, network_input
 from pipeline.network.checkpoint import save_checkpoint_bytes
 from pipeline.network.ga_cnn import GaCnn, build_network
+from pipeline.network.input_channels import CHANNELS, SYMMETRIES
 from pipeline.network.loading import (
     RawBatch,
     WaitClock,
@@ -40,14 +39,15 @@ from pipeline.network.loading import (
     part_of_rank,
 )
 from pipeline.network.parallel import ALONE, Ranks, sync_batch_norms
+from pipeline.network.reproducible import reproducible
 from pipeline.network.resuming import (
     STATE_FILE,
-    EpochMetrics,
     TrainingState,
     load_training_state,
     save_training_state,
 )
 from pipeline.network.samples import GraspTensors, SampleReader
+from pipeline.network.training_figures import EpochMetrics
 from pipeline.progress import progress
 
 # Rises whenever the loop changes what it computes: a state of another version is not continued.
@@ -316,21 +316,6 @@ def choose_device(wanted: str, ranks: Ranks) -> torch.device:
 def mixed_precision(device: torch.device) -> torch.autocast:
     """Use bfloat16 on a GPU; its exponent is single precision's, so the loss needs no scaling."""
     return torch.autocast(device.type, dtype=torch.bfloat16, enabled=device.type == "cuda")
-
-
-@contextmanager
-def reproducible(threads: int) -> Iterator[None]:
-    """Fix thread count and deterministic kernels for the block, and restore both afterwards."""
-    threads_before = torch.get_num_threads()
-    deterministic_before = torch.are_deterministic_algorithms_enabled()
-    os.environ.setdefault("CUBLAS_WORKSPACE_CONFIG", ":4096:8")
-    torch.set_num_threads(threads)
-    torch.use_deterministic_algorithms(True)
-    try:
-        yield
-    finally:
-        torch.use_deterministic_algorithms(deterministic_before)
-        torch.set_num_threads(threads_before)
 
 
 def _mean_absolute_error(

@@ -11,11 +11,9 @@ from jaxtyping import Float, Integer
 from pipeline.artifacts import open_artifact
 from pipeline.messages.samples import read_chosen, read_rows
 from pipeline.messages.training import figures_of, fine_tuning_of, metrics_of
-from pipeline.network.fine_tuning import FineTuning
 from pipeline.network.fitted_baselines import MEAN, TITLES
-from pipeline.network.held_out import TestFigures
-from pipeline.network.resuming import EpochMetrics
 from pipeline.network.samples import Samples
+from pipeline.network.training_figures import EpochMetrics, FineTuning, TestFigures
 from pipeline.recording import colours
 from pipeline.recording.recording import (
     SHEET_SPACING,

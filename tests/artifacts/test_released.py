@@ -17,7 +17,8 @@ from pipeline.messages.samples import read_samples
 from pipeline.messages.scenes import read_scenes
 from pipeline.messages.training import CHECKPOINT, EXPORT
 from pipeline.network.checkpoint import load_checkpoint_bytes
-from pipeline.network.control_inference import ControlPredictor, check_export
+from pipeline.network.control_inference import ControlPredictor
+from pipeline.network.export import check_export
 from pipeline.network.inference import predict
 from schemas.compatibility import read_released, versions
 from schemas.softgrip.v1.evaluation_pb2 import Attempt, LevelResult

@@ -12,9 +12,9 @@ from pipeline.errors import ConfigError
 from pipeline.execution.training_samples import TrainingSet, open_training_set
 from pipeline.messages.bounded_samples import DECODED, BoundedSamples
 from pipeline.network.checkpoint import save_checkpoint_bytes
-from pipeline.network.resuming import EpochMetrics
 from pipeline.network.samples import Samples
 from pipeline.network.training import TrainedNetwork, train
+from pipeline.network.training_figures import EpochMetrics
 from tests.messages.test_sample_cache import sharded
 from tests.network.planes import planes_with_holes
 

@@ -10,7 +10,8 @@ from pipeline.config import RunConfig
 from pipeline.geometry.transforms import frame_from_z, look_at
 from pipeline.labelling.grasps import LabelledGrasps
 from pipeline.labelling.scene import label_scene, scene_surfaces
-from pipeline.network.canonical import CHANNELS, network_input
+from pipeline.network.canonical import network_input
+from pipeline.network.input_channels import CHANNELS
 from pipeline.world.cameras import PinholeCamera, pixel_rays
 from pipeline.world.posed_bodies import TABLE
 from pipeline.world.scene import ClutterScene, PlacedObject

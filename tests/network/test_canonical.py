@@ -7,15 +7,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.network.canonical import (
-    CHANNELS,
-    CHANNELS_0_1,
-    KNOWN_CHANNELS,
-    SYMMETRIES,
     apply_symmetry,
     inverse_symmetry,
     network_input,
     reference_height,
 )
+from pipeline.network.input_channels import CHANNELS, CHANNELS_0_1, KNOWN_CHANNELS, SYMMETRIES
 from tests.network.planes import CELLS, HALF_SIDE, grid_xy
 
 seeds = st.integers(0, 2**32 - 1)

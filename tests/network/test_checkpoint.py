@@ -7,9 +7,9 @@ from safetensors.torch import save
 from pipeline.config.learning import NetworkConfig
 from pipeline.errors import ArtifactError
 from pipeline.network import checkpoint
-from pipeline.network.canonical import CHANNELS
 from pipeline.network.checkpoint import load_checkpoint_bytes, save_checkpoint_bytes
 from pipeline.network.ga_cnn import GaCnn, build_network
+from pipeline.network.input_channels import CHANNELS
 
 CONFIG = NetworkConfig(layers=18, channels=(16, 16, 16, 16))
 

@@ -12,10 +12,12 @@ import torch
 
 from pipeline.errors import ArtifactError, ContentError
 from pipeline.execution import run_in_order
-from pipeline.network.canonical import CHANNELS, network_input
-from pipeline.network.control_inference import ControlPredictor, check_export
+from pipeline.network.canonical import network_input
+from pipeline.network.control_inference import ControlPredictor
+from pipeline.network.export import check_export
 from pipeline.network.ga_cnn import GaCnn, build_network
 from pipeline.network.inference import predict
+from pipeline.network.input_channels import CHANNELS
 from tests.network.planes import planes_with_holes
 from tests.network.test_hostile_checkpoints import model, node
 from tests.network.test_inference import lively
@@ -94,7 +96,7 @@ def test_networks_that_cannot_be_run_are_refused(data: bytes) -> None:
             ControlPredictor(bad, threads=1)
 
 
-def test_nothing_is_said_or_kept(data: bytes, tmp_path: Path) -> None:
+def test_nothing_is_said_or_kept_and_pytorch_is_not_needed(data: bytes, tmp_path: Path) -> None:
     """The runtime by itself tells Google Analytics and leaves an identifier in the home folder."""
     home, export = tmp_path / "home", tmp_path / "export.onnx"
     home.mkdir()
@@ -105,6 +107,7 @@ def test_nothing_is_said_or_kept(data: bytes, tmp_path: Path) -> None:
         "predictor = ControlPredictor(pathlib.Path(sys.argv[1]).read_bytes(), 2)\n"
         "predictor.predict(numpy.zeros((9, 24, 24, 3)), numpy.ones((9, 24, 24), dtype=bool))\n"
         "assert sys.modules['openvino_telemetry'] is None\n"
+        "assert 'torch' not in sys.modules\n"
     )
     # As on a person's machine; should it tell after all, it shall not get through.
     kept = {name: value for name, value in os.environ.items() if name not in ("CI", "TF_BUILD")}

@@ -5,8 +5,9 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.network.canonical import CHANNELS, network_input
+from pipeline.network.canonical import network_input
 from pipeline.network.control_input import control_input
+from pipeline.network.input_channels import CHANNELS
 from tests.network.planes import grid_xy, planes_with_holes
 
 

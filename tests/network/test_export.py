@@ -8,7 +8,8 @@ from torch import nn
 
 import pipeline
 from pipeline.errors import ContentError
-from pipeline.network.export import check_onnx_bytes, export_onnx_bytes
+from pipeline.network.export import export_onnx_bytes
+from pipeline.network.exported import check_onnx_bytes
 from pipeline.network.ga_cnn import GaCnn
 
 

@@ -5,7 +5,6 @@ import pytest
 from pydantic import ValidationError
 
 from pipeline.config.learning import NetworkConfig, SweepConfig
-from pipeline.network.canonical import CHANNELS
 from pipeline.network.family import (
     VARIANTS,
     choose_member,
@@ -15,6 +14,7 @@ from pipeline.network.family import (
     standard_error,
 )
 from pipeline.network.ga_cnn import build_network
+from pipeline.network.input_channels import CHANNELS
 
 OF_RUN = NetworkConfig(layers=52, channels=(64, 128, 256, 512))
 

@@ -8,7 +8,6 @@ import pytest
 
 from pipeline.config.learning import NetworkConfig, TrainConfig
 from pipeline.errors import ArtifactError, ConfigError
-from pipeline.network.canonical import CHANNELS_0_1
 from pipeline.network.checkpoint import save_checkpoint_bytes
 from pipeline.network.fine_tuning import (
     grasps_from_bytes,
@@ -17,9 +16,10 @@ from pipeline.network.fine_tuning import (
     starting_network,
 )
 from pipeline.network.ga_cnn import GaCnn, build_network
-from pipeline.network.resuming import EpochMetrics
+from pipeline.network.input_channels import CHANNELS_0_1
 from pipeline.network.samples import GraspTensors
 from pipeline.network.training import TrainedNetwork, train
+from pipeline.network.training_figures import EpochMetrics
 from tests.network.planes import planes_with_holes
 
 NETWORK = NetworkConfig(layers=18, channels=(8, 8, 16, 32))

@@ -6,13 +6,13 @@ from pydantic import ValidationError
 
 from pipeline.config.learning import DEEPEST, SHALLOWEST, NetworkConfig
 from pipeline.errors import ConfigError
-from pipeline.network.canonical import CHANNELS
 from pipeline.network.ga_cnn import (
     blocks_per_stage,
     build_network,
     parameter_count,
     weighted_layer_count,
 )
+from pipeline.network.input_channels import CHANNELS
 
 PUBLISHED = NetworkConfig(layers=52, channels=(64, 128, 256, 512))
 SMALL = NetworkConfig(layers=18, channels=(16, 32, 64, 128))

@@ -12,10 +12,10 @@ from onnx import TensorProto, helper, numpy_helper
 from pipeline.artifacts import ArtifactWriter, Provenance, open_artifact
 from pipeline.config.learning import NetworkConfig
 from pipeline.messages.training import CHECKPOINT, EXPORT
-from pipeline.network.canonical import CHANNELS
 from pipeline.network.checkpoint import FORMAT, _digest, load_checkpoint_bytes
 from pipeline.network.control_inference import ControlPredictor
-from pipeline.network.export import _metadata
+from pipeline.network.exported import marks_of
+from pipeline.network.input_channels import CHANNELS
 from tests.refusals import ROOT, assert_refused_cheaply
 
 CONFIG = NetworkConfig(layers=18, channels=(8, 8, 8, 8))
@@ -88,7 +88,7 @@ def model(
     outputs = [helper.make_tensor_value_info("q", TensorProto.FLOAT, gives)]
     graph = helper.make_graph(nodes, "g", inputs, outputs, weights)
     made = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 18)], ir_version=10)
-    for key, value in _metadata(CHANNELS).items():
+    for key, value in marks_of(CHANNELS).items():
         made.metadata_props.add(key=key, value=value)
     data: bytes = made.SerializeToString()
     return data

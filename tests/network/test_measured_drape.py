@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from pipeline.config.grasps import CELL_SIDE, PadConfig
 from pipeline.gripper.draping import drape
 from pipeline.gripper.pad import build_pad
-from pipeline.network.measured_drape import REACH, draped_gap
+from pipeline.network.input_channels import REACH
+from pipeline.network.measured_drape import draped_gap
 from tests.network.planes import CELLS, grid_xy
 
 EVERYWHERE = torch.ones(1, CELLS, CELLS, dtype=torch.bool)

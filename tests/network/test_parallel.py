@@ -9,8 +9,8 @@ import pytest
 import torch
 
 from pipeline.config.learning import NetworkConfig
-from pipeline.network.canonical import CHANNELS
 from pipeline.network.ga_cnn import build_network
+from pipeline.network.input_channels import CHANNELS
 from pipeline.network.parallel import ALONE, SyncedBatchNorm, join_ranks, sync_batch_norms
 from tests.network.train_in_ranks import SAMPLES, trained_in
 

@@ -15,9 +15,10 @@ from pipeline.network.baselines import mean_predictor_mae
 from pipeline.network.checkpoint import save_checkpoint_bytes
 from pipeline.network.figures import mean_absolute_error
 from pipeline.network.inference import predict
-from pipeline.network.resuming import STATE_FILE, EpochMetrics, save_training_state
+from pipeline.network.resuming import STATE_FILE, save_training_state
 from pipeline.network.samples import GraspTensors
 from pipeline.network.training import TrainedNetwork, learning_rate_at, train
+from pipeline.network.training_figures import EpochMetrics
 from tests.network.planes import planes_with_holes
 
 NETWORK = NetworkConfig(layers=18, channels=(16, 16, 32, 32))

@@ -11,8 +11,8 @@ from pipeline.config import load_run_config
 from pipeline.execution import RunFolder
 from pipeline.messages.samples import read_split
 from pipeline.network import training
-from pipeline.network.resuming import EpochMetrics
 from pipeline.network.samples import GraspTensors, Samples
+from pipeline.network.training_figures import EpochMetrics
 from pipeline.regression.comparison import Difference, differences
 from pipeline.regression.spread import (
     EARLY_EPOCH,
