@@ -22,7 +22,8 @@ from pipeline.config import RunConfig, load_run_config
 from pipeline.execution import RunFolder, generator, run_command, run_in_order
 from pipeline.geometry.catalogue import CatalogueObject
 from pipeline.geometry.mesh import Mesh
-from pipeline.labelling.poses import ROUND, pad_of
+from pipeline.gripper import pad_of
+from pipeline.labelling.poses import ROUND
 from pipeline.labelling.rounds import label_rounds
 from pipeline.labelling.scene import label_scene, scene_surfaces, visible_surface
 from pipeline.messages.objects import read_objects

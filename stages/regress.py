@@ -24,8 +24,8 @@ from pipeline.config import load_run_config
 from pipeline.config.cameras import RendererName
 from pipeline.errors import ArtifactError, SoftgripError
 from pipeline.execution import RunFolder, generator, run_command
+from pipeline.gripper import pad_of
 from pipeline.labelling.heights import pad_heights
-from pipeline.labelling.poses import pad_of
 from pipeline.labelling.rounds import label_rounds
 from pipeline.labelling.scene import scene_surfaces, visible_surface
 from pipeline.messages.objects import read_objects

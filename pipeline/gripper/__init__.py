@@ -5,7 +5,7 @@ of GCS and from any origin, with a mask of the vertices below which the target l
 """
 
 from pipeline.gripper.batch import LabelBatch, label, label_batch
-from pipeline.gripper.pad import Pad, build_pad
+from pipeline.gripper.pad import Pad, build_pad, pad_of
 from pipeline.gripper.problem import GraspStatus, QpSolution, QualityProblem
 from pipeline.gripper.quality import GraspQuality, WeightSummary, label_reference
 
@@ -21,4 +21,5 @@ __all__ = [
     "label",
     "label_batch",
     "label_reference",
+    "pad_of",
 ]

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -97,6 +98,12 @@ def build_pad(config: PadConfig) -> Pad:
     for array in (vertices, triangles, pad.edges, areas, in_seal, radii):
         array.setflags(write=False)
     return pad
+
+
+@lru_cache(maxsize=4)
+def pad_of(config: PadConfig) -> Pad:
+    """`build_pad`, once for each configuration in a process: its arrays cannot be written."""
+    return build_pad(config)
 
 
 def _ring_radii(config: PadConfig) -> Float[np.ndarray, " rings"]:

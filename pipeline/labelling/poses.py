@@ -1,22 +1,14 @@
 """Labels at given poses on given surfaces: S-1.07 - S-1.12."""
 
-from functools import lru_cache
-
 import numpy as np
 from jaxtyping import Float, Int
 
-from pipeline.config.grasps import GripperConfig, PadConfig
-from pipeline.gripper import LabelBatch, Pad, build_pad, label_batch
+from pipeline.config.grasps import GripperConfig
+from pipeline.gripper import LabelBatch, label_batch, pad_of
 from pipeline.labelling.heights import pad_heights
 from pipeline.world.raycasting import Surfaces
 
 ROUND = 512  # grasps labelled at once: bounds the memory of their rays
-
-
-@lru_cache(maxsize=4)
-def pad_of(config: PadConfig) -> Pad:
-    """The pad of a configuration in GCS (S-1.02, S-1.03), built once in each process."""
-    return build_pad(config)
 
 
 def label_poses(

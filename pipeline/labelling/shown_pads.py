@@ -7,11 +7,11 @@ import numpy as np
 from jaxtyping import Float, Int, Integer
 
 from pipeline.config import RunConfig
+from pipeline.gripper import pad_of
 from pipeline.gripper.draping import drape
 from pipeline.gripper.quality import triangle_pressure
 from pipeline.labelling.grasps import LabelledGrasps
 from pipeline.labelling.heights import pad_heights
-from pipeline.labelling.poses import pad_of
 from pipeline.spread import choose_evenly
 from pipeline.world.raycasting import Surfaces
 

@@ -15,7 +15,7 @@ from jaxtyping import Bool, Float
 from scipy import ndimage
 
 from pipeline.config.grasps import GripperConfig
-from pipeline.gripper import build_pad, label_batch
+from pipeline.gripper import label_batch, pad_of
 from pipeline.network.baselines import MonotoneRegressor, fit_monotone
 from pipeline.network.figures import mean_absolute_error
 
@@ -142,7 +142,7 @@ def measured_quality(
     config = gripper.model_copy(
         update={"pad": gripper.pad.model_copy(update={"contact_tolerance_rg": tolerance})}
     )
-    pad = build_pad(config.pad)
+    pad = pad_of(config.pad)
     at = pad.vertices_xy_m / radius_m
     quality = np.empty(len(cloud))
     for start in range(0, len(cloud), PART):

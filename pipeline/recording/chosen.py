@@ -12,8 +12,8 @@ from pipeline.config import RunConfig
 from pipeline.config.grasps import PadConfig
 from pipeline.errors import ArtifactError
 from pipeline.geometry.mesh import Mesh
+from pipeline.gripper import pad_of
 from pipeline.labelling.balancing import quality_histogram
-from pipeline.labelling.poses import pad_of
 from pipeline.labelling.shown_pads import drape_again
 from pipeline.messages.grasps import read_grasps
 from pipeline.messages.objects import read_objects

@@ -18,9 +18,9 @@ from pipeline.artifacts import from_tensor, open_artifact
 from pipeline.artifacts.sharding import read_index
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.transforms import invert
+from pipeline.gripper import pad_of
 from pipeline.gripper.pad import Pad
 from pipeline.labelling.grasps import GraspOrigin, LabelledGrasps
-from pipeline.labelling.poses import pad_of
 from pipeline.labelling.shown_pads import SHOWN_SCENES
 from pipeline.messages.grasps import pads_of, read_grasps
 from pipeline.messages.objects import read_objects

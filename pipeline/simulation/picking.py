@@ -14,7 +14,7 @@ from pipeline.control.policy import Attempt
 from pipeline.control.ranking import Predict
 from pipeline.control.strategies import build_strategy
 from pipeline.geometry.catalogue import CatalogueObject
-from pipeline.gripper.pad import build_pad
+from pipeline.gripper.pad import pad_of
 from pipeline.physics.engine import Body, add_body, new_world
 from pipeline.simulation.arm import ArmMover
 from pipeline.simulation.ceiling import Ceilings
@@ -69,7 +69,7 @@ class Clutter:
         imperfection = config.evaluate.imperfection
         beside = len(config.cameras.static.elevations_rad)
         calibration = draw_calibration(imperfection, beside, calibrated)
-        pad, sensor = build_pad(config.gripper.pad), None
+        pad, sensor = pad_of(config.gripper.pad), None
         if imperfection.scale > 0.0:
             sensor = WrenchSensor(imperfection, calibration.wrench_bias, felt)
         self.gripper = SuctionGripper(

@@ -6,9 +6,9 @@ import trimesh
 
 from pipeline.config.grasps import PadConfig
 from pipeline.geometry.mesh import Mesh
+from pipeline.gripper import pad_of
 from pipeline.labelling import heights
 from pipeline.labelling.heights import pad_heights, pad_heights_by_rays
-from pipeline.labelling.poses import pad_of
 from pipeline.labelling.sampling import contact_frames
 from pipeline.world.raycasting import RayScene
 
