@@ -23,8 +23,6 @@ from pipeline.messages.evaluation_results import results_of, without_film
 from pipeline.messages.objects import catalogue
 from pipeline.messages.proposed_contacts import proposed_of
 from pipeline.messages.scenes import read_unseen_scenes
-from pipeline.recording.evaluate import draw_evaluate
-from pipeline.recording.results import read_tables
 from pipeline.world.scene import ClutterScene
 from schemas.softgrip.v1.evaluation_pb2 import Attempt, ProposedContacts
 from stages.attempts import ClutterJob, ContactsJob, clutter_jobs, contacts_jobs, made_in, work
@@ -79,6 +77,10 @@ def clutters(stage: StageContext) -> list[ClutterScene]:
 
 
 if __name__ == "__main__":
+    # Not in workers: they draw nothing.
+    from pipeline.recording.evaluate import draw_evaluate
+    from pipeline.recording.results import read_tables
+
     if sys.argv[1:] == ["--table"]:
         finished = RunFolder(RUNS_DIR / os.environ.get("RUN", "default"))
         sys.stdout.write(read_tables(finished.artifact("evaluate")))

@@ -23,7 +23,6 @@ from pipeline.labelling.scene import noise_draws
 from pipeline.labelling.shown_pads import SHOWN_SCENES
 from pipeline.messages.grasps import portions_by_key
 from pipeline.messages.scenes import read_keys, scene_places
-from pipeline.recording.grasps import draw_grasps
 from pipeline.spread import choose_evenly
 from stages.graph import GRASPS, inputs_of
 from stages.grasp_shards import Portion, ShardJob, ShardResult, portion_key, synthesize_shard
@@ -111,4 +110,6 @@ def summary(
 
 
 if __name__ == "__main__":
+    from pipeline.recording.grasps import draw_grasps  # not in workers: they draw nothing
+
     stage_command(GRASPS, build, inputs_of, draw=draw_grasps)

@@ -37,7 +37,6 @@ from pipeline.geometry.selection import Split
 from pipeline.geometry.settled import SETTLED_FILE, read_settled
 from pipeline.geometry.stretching import stretched_for_training
 from pipeline.messages.objects import REFUSED_TOPIC, TOPIC, object_message, objects_by_key
-from pipeline.recording.objects import draw_objects
 from schemas.softgrip.v1.objects_pb2 import RefusedMesh
 from stages.graph import OBJECTS, inputs_of
 
@@ -196,4 +195,6 @@ def summary(
 
 
 if __name__ == "__main__":
+    from pipeline.recording.objects import draw_objects  # not in workers: they draw nothing
+
     stage_command(OBJECTS, build, inputs_of, draw=draw_objects)

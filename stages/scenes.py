@@ -17,7 +17,6 @@ from pipeline.execution.items import scenes_basis
 from pipeline.execution.rendering_nodes import run_on_rendering_nodes
 from pipeline.messages.objects import catalogue
 from pipeline.messages.scenes import scene_of, write_scene_index
-from pipeline.recording.scenes import draw_scenes
 from pipeline.world.scene import ClutterScene
 from stages.clutters import SceneJob, scene_jobs
 from stages.graph import SCENES, inputs_of
@@ -103,4 +102,6 @@ def summary(scenes: list[ClutterScene], objects: Collection[str]) -> Summary:
 
 
 if __name__ == "__main__":
+    from pipeline.recording.scenes import draw_scenes  # not in workers: they draw nothing
+
     stage_command(SCENES, build, inputs_of, draw=draw_scenes)

@@ -20,7 +20,6 @@ from pipeline.execution.shuffle_plan import Part, ShufflePlan, plan_shuffle
 from pipeline.execution.shuffling import Gathered, GatherJob, ScatterJob, gather, scatter_group
 from pipeline.messages.samples import object_names_in
 from pipeline.network.samples import SPLITS
-from pipeline.recording.shards import draw_shards
 from stages.graph import SHARDS, inputs_of
 
 
@@ -134,4 +133,6 @@ def summary(parts: Sequence[Part], gathered: Sequence[Gathered], names: Sequence
 
 
 if __name__ == "__main__":
+    from pipeline.recording.shards import draw_shards  # not in workers: they draw nothing
+
     stage_command(SHARDS, build, inputs_of, draw=draw_shards)

@@ -47,7 +47,6 @@ from pipeline.network.family import (
 )
 from pipeline.network.samples import SPLITS, Samples
 from pipeline.network.training import train
-from pipeline.recording.sweep import draw_sweep
 from schemas.softgrip.v1.training_pb2 import SweepBudget, SweepNetwork
 from stages.graph import SWEEP, inputs_of
 
@@ -147,4 +146,6 @@ def write(stage: StageContext, networks: list[SweepNetwork], budget: SweepBudget
 
 
 if __name__ == "__main__":
+    from pipeline.recording.sweep import draw_sweep  # not in workers: they draw nothing
+
     stage_command(SWEEP, build, inputs_of, draw=draw_sweep)
