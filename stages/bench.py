@@ -124,10 +124,9 @@ def end_to_end(bench: Bench) -> dict[str, object]:
         return labelled_scene(bench, scene, wanted, generator(config.seed, "bench", scene.scene_id))
 
     labelled = len(bench.scenes) * int(np.ceil(wanted * config.grasps.oversampling))
-    faces = [len(mesh.faces) for mesh in bench.meshes.values()]
     return {
         **labelling.end_to_end(bench.scenes, label, labelled),
-        "median_faces_a_mesh": int(np.median(faces)),
+        "median_faces_a_mesh": int(np.median([len(m.faces) for m in bench.meshes.values()])),
     }
 
 
