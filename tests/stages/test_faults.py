@@ -198,10 +198,13 @@ def test_interrupted_as_from_a_keyboard(run: RunFolder, tmp_path: Path, stage: s
 
 
 def test_a_second_process_is_told_who_holds_the_run(run: RunFolder, tmp_path: Path) -> None:
+    """The first is paused meanwhile: it might else be done before the second has looked."""
     folder = before(run, "train", tmp_path)
     first = started("train", tmp_path, workers=1)
     wait_until(first, folder.state("owner").exists)
+    os.killpg(first.pid, signal.SIGSTOP)
     second = run_stage("train", tmp_path, workers=1)
+    os.killpg(first.pid, signal.SIGCONT)
     assert_explained(
         second, f"in use by process {first.pid} (stage train)", "Wait until it is done"
     )
