@@ -10,6 +10,7 @@ import hashlib
 from collections.abc import Callable, Collection, Iterator
 from functools import cache
 from pathlib import Path
+from types import FunctionType
 from typing import Any, Literal, TypeVar, cast
 
 import numba
@@ -68,13 +69,11 @@ class LocatorByAllSources(caching._CacheLocator):  # type: ignore[misc]
         What is compiled.
     """
 
-    def __init__(self, place: Any, function: Callable[..., Any]) -> None:
+    def __init__(self, place: Any, function: FunctionType) -> None:
         self._place, self._function = place, function
 
     @classmethod
-    def from_function(
-        cls, py_func: Callable[..., Any], py_file: str
-    ) -> "LocatorByAllSources | None":
+    def from_function(cls, py_func: FunctionType, py_file: str) -> "LocatorByAllSources | None":
         """The locator of a function below pipeline/; None of another: numba takes its own."""
         if not Path(py_file).is_relative_to(_OURS):
             return None
@@ -96,11 +95,11 @@ class LocatorByAllSources(caching._CacheLocator):  # type: ignore[misc]
         return self._place.get_disambiguator()
 
     def get_source_stamp(self) -> Any:
-        """Of the function's own file, and of what it may take from others."""
+        """Differs once the function's file has changed, or anything that it takes from others."""
         return self._place.get_source_stamp(), taken_from_elsewhere(self._function)
 
 
-def taken_from_elsewhere(function: Callable[..., Any]) -> tuple[tuple[str, Any], ...]:
+def taken_from_elsewhere(function: FunctionType) -> tuple[tuple[str, Any], ...]:
     """What machine code of a function may hold that is not written in the function's own file.
 
     Parameters
@@ -116,8 +115,10 @@ def taken_from_elsewhere(function: Callable[..., Any]) -> tuple[tuple[str, Any],
     return tuple(sorted(_taken(function), key=lambda found: found[0]))
 
 
-def _taken(function: Callable[..., Any]) -> Iterator[tuple[str, Any]]:
-    for name, value in vars_of_module(function).items():
+def _taken(function: FunctionType) -> Iterator[tuple[str, Any]]:
+    for name, value in function.__globals__.items():
+        if name.startswith("__"):  # Python's own
+            continue
         if isinstance(value, numba.core.dispatcher.Dispatcher):
             called = value.py_func
             if called.__module__ != function.__module__:
@@ -126,12 +127,6 @@ def _taken(function: Callable[..., Any]) -> Iterator[tuple[str, Any]]:
             yield name, (value.dtype.str, value.shape, hashlib.sha256(value.tobytes()).hexdigest())
         elif isinstance(value, _VALUES):
             yield name, repr(value)
-
-
-def vars_of_module(function: Callable[..., Any]) -> dict[str, Any]:
-    """What a function's module has by now, by name, without what Python keeps there."""
-    module: dict[str, Any] = getattr(function, "__globals__", {})
-    return {name: value for name, value in module.items() if not name.startswith("__")}
 
 
 @cache

@@ -4,6 +4,8 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from types import FunctionType
+from typing import cast
 
 import pytest
 
@@ -74,4 +76,5 @@ def test_a_changed_callee_or_constant_of_another_module_is_compiled_in(
 def test_a_function_that_is_not_ours_is_kept_as_numba_keeps_it(tmp_path: Path) -> None:
     source = tmp_path / "other.py"
     source.touch()
-    assert compiled_code.LocatorByAllSources.from_function(result_and_hits, str(source)) is None
+    function = cast(FunctionType, result_and_hits)
+    assert compiled_code.LocatorByAllSources.from_function(function, str(source)) is None

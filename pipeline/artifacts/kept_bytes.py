@@ -27,19 +27,24 @@ def kept_bytes(path: Path, make: Callable[[], bytes]) -> bytes:
     -------
     The bytes.
     """
-    kept = _read(path)
+    kept = read_kept(path)
     if kept is not None:
         return kept
     made = make()
+    keep(path, made)
+    return made
+
+
+def keep(path: Path, made: bytes) -> None:
+    """Write bytes down behind their digest; where that cannot be, it is told to the log alone."""
     try:
         publish_bytes(path, hashlib.sha256(made).digest() + made)
     except (SoftgripError, OSError) as error:
         logger.debug("{} is not kept: {}", path, error)
-    return made
 
 
-def _read(path: Path) -> bytes | None:
-    """The bytes behind their digest; None where they are missing or damaged."""
+def read_kept(path: Path) -> bytes | None:
+    """The bytes that `keep` wrote; None where they are missing or damaged."""
     try:
         data = path.read_bytes()
     except OSError:

@@ -15,10 +15,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from loguru import logger
-
-from pipeline.artifacts.publishing import publish_bytes
-from pipeline.errors import SoftgripError
+from pipeline.artifacts.kept_bytes import keep, read_kept
 
 CONFIG = "pipeline.config"
 CONFIG_READER = "pipeline.config.tree"  # its functions make values, which are digested themselves
@@ -80,11 +77,7 @@ def keep_facts() -> None:
     """Write down what was found anew; where that cannot be, the next process finds it again."""
     if not _new:
         return
-    text = json.dumps(_kept()).encode()
-    try:
-        publish_bytes(_FILE, hashlib.sha256(text).digest() + text)
-    except (SoftgripError, OSError) as error:
-        logger.debug("{} is not kept: {}", _FILE, error)
+    keep(_FILE, json.dumps(_kept()).encode())
     _new.clear()
 
 
@@ -99,15 +92,8 @@ _new: list[str] = []  # modules whose facts are not in the file
 @cache
 def _kept() -> dict[str, dict[str, Any]]:
     """What the file keeps, by module; nothing where it is missing or damaged."""
-    try:
-        data = _FILE.read_bytes()
-    except OSError:
-        return {}
-    size = hashlib.sha256().digest_size
-    digest, text = data[:size], data[size:]
-    if hashlib.sha256(text).digest() != digest:
-        return {}
-    kept: dict[str, dict[str, Any]] = json.loads(text)
+    text = read_kept(_FILE)
+    kept: dict[str, dict[str, Any]] = {} if text is None else json.loads(text)
     return kept
 
 

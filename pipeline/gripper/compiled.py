@@ -1,11 +1,6 @@
 """The one way functions of this package are compiled to machine code."""
 
-from collections.abc import Callable
-from typing import Any, TypeVar
-
-from pipeline.compiled_code import njit
-
-Function = TypeVar("Function", bound=Callable[..., Any])
+from pipeline.compiled_code import Function, njit
 
 
 def compiled(function: Function) -> Function:

@@ -34,7 +34,7 @@ class ExportedInput:
     Attributes
     ----------
     channels
-        The channels of its input, see `pipeline.network.canonical`.
+        The channels of its input, see `pipeline.network.input_channels`.
     cells
         Cells a side of its clouds: `sensing.grid_cells` of the run that trained it.
     """

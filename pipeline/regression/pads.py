@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float
 
 from pipeline.artifacts import ArtifactWriter, Provenance, from_tensor, open_artifact, to_tensor
 from pipeline.config import GripperConfig
-from pipeline.gripper import LabelBatch, build_pad, label_batch
+from pipeline.gripper import LabelBatch, label_batch, pad_of
 from schemas.softgrip.v1.tensor_pb2 import Tensor
 
 HEIGHTS, ON_TARGET = "/heights_m", "/on_target"
@@ -44,4 +44,4 @@ def labelled_pads(path: Path, config: GripperConfig) -> LabelBatch:
     with open_artifact(path) as artifact:
         (heights,) = (from_tensor(m) for _, m in artifact.messages(Tensor, HEIGHTS))
         (target,) = (from_tensor(m) for _, m in artifact.messages(Tensor, ON_TARGET))
-    return label_batch(build_pad(config.pad), config, heights.astype(np.float64), target == 1)
+    return label_batch(pad_of(config.pad), config, heights.astype(np.float64), target == 1)
