@@ -7,7 +7,7 @@ from functools import partial
 
 from loguru import logger
 
-from pipeline.artifacts import ArtifactWriter, publish_bytes
+from pipeline.artifacts import publish_bytes
 from pipeline.config import section_digest
 from pipeline.errors import MeshError
 from pipeline.execution import (
@@ -24,7 +24,14 @@ from pipeline.execution.items import item_key, object_key, objects_basis
 from pipeline.execution.left_out import LeftOut
 from pipeline.geometry.catalogue import CatalogueObject, MeasuredObject
 from pipeline.geometry.families import DeclaredFamily, read_declared
-from pipeline.geometry.intake import Source, all_sources, finished_or_why_not, measured_or_why_not
+from pipeline.geometry.intake import (
+    Source,
+    all_sources,
+    files_of,
+    finished_or_why_not,
+    measured_or_why_not,
+    with_all_files,
+)
 from pipeline.geometry.masses import mass_of, read_masses
 from pipeline.geometry.mesh_folders import FAMILIES_FILE, MASSES_FILE
 from pipeline.geometry.plan import Plan, plan_catalogue
@@ -36,7 +43,7 @@ from pipeline.geometry.random_solids.catalogued import (
 from pipeline.geometry.selection import Split
 from pipeline.geometry.settled import SETTLED_FILE, read_settled
 from pipeline.geometry.stretching import stretched_for_training
-from pipeline.messages.objects import REFUSED_TOPIC, TOPIC, object_message, objects_by_key
+from pipeline.messages.objects import objects_by_key, write_objects
 from schemas.softgrip.v1.objects_pb2 import RefusedMesh
 from stages.graph import OBJECTS, inputs_of
 
@@ -56,7 +63,10 @@ def build(stage: StageContext) -> Summary:
     )
     left_out, most = LeftOut(), Allowance(config.max_seconds, config.max_memory_mib)
     former = objects_by_key(stage.output)
-    with Isolation(stage.workers, most, stage.executor_here()) as apart:
+    with (
+        stage.lending(stage.mesh_dir, files_of(jobs)),
+        Isolation(stage.workers, most, stage.executor, stage.store) as apart,
+    ):
         measured = measure(stage, jobs, apart, left_out)
         plan, objects = finish(stage, measured, planned, apart, left_out, former)
         solids = random_solids(stage, plan, apart, left_out, former)
@@ -73,7 +83,8 @@ def build(stage: StageContext) -> Summary:
     publish_bytes(settled_in, plan.settled.to_json().encode())
     for remark in plan.remarks:
         logger.warning("{}", remark)
-    publish(stage, objects, split, left_out)
+    provenance = stage.provenance(left_out.cut_short)
+    write_objects(stage.output, provenance, objects, split, left_out.refused)
     figures = {"stretched_near_held_out": near, "solids_near_held_out": solids_near, **plan.figures}
     taken_over = sum(item.key in former for item in objects[: len(objects) - len(stretched)])
     figures |= {"taken_over": taken_over, "made": len(objects) - taken_over}
@@ -94,7 +105,11 @@ def declared_families(stage: StageContext) -> tuple[DeclaredFamily, ...]:
 def sources(stage: StageContext) -> tuple[list[Source], frozenset[str]]:
     """Every source, and the names of the embedded ones that meshes are trained beside."""
     paths = [path for name, path in stage.inputs.items() if name.startswith("meshes/")]
-    return all_sources(paths, stage.mesh_dir, stage.config.objects.embedded_in_training)
+    config = stage.config.objects
+    found, added = all_sources(paths, stage.mesh_dir, config.embedded_in_training)
+    if stage.works_from_store:
+        found = with_all_files(found, stage.mesh_dir, config)
+    return found, added
 
 
 def measure(
@@ -103,7 +118,7 @@ def measure(
     """Load, repair and measure every source; what is refused is named, the others go on."""
     job = partial(measured_or_why_not, config=stage.config.objects, folder=stage.mesh_dir)
     shown = progress(apart.run_in_order(job, jobs), len(jobs), "objects: repair and NSVR", "mesh")
-    return left_out.sifted([name for _, name in jobs], shown)
+    return left_out.sifted([job.label for job in jobs], shown)
 
 
 def random_solids(
@@ -161,20 +176,6 @@ def finish(
     of, copies = plan.families.of, plan.copies
     made = [done[key_of(item)] for item in plan.taken]
     return plan, [replace(i, family=of[i.name], copies=copies.get(i.name, ())) for i in made]
-
-
-def publish(
-    stage: StageContext,
-    objects: list[CatalogueObject],
-    split: Mapping[str, Split],
-    left_out: LeftOut,
-) -> None:
-    """Write the artifact."""
-    with ArtifactWriter(stage.output, stage.provenance(left_out.cut_short)) as artifact:
-        for index, item in enumerate(objects):
-            artifact.write(TOPIC, object_message(item, split[item.name]), log_time_ns=index)
-        for index, message in enumerate(left_out.refused):
-            artifact.write(REFUSED_TOPIC, message, log_time_ns=index)
 
 
 def summary(

@@ -29,7 +29,7 @@ from pipeline.artifacts import ArtifactWriter, Provenance
 from pipeline.artifacts.sharding import is_current
 from pipeline.config import RunConfig
 from pipeline.execution import StageContext, Summary, progress, run_in_order, stage_command
-from pipeline.messages.sample_cache import first_samples
+from pipeline.messages.sample_cache import first_samples, first_shards
 from pipeline.messages.sweep import (
     budget_message,
     mark_networks,
@@ -57,11 +57,15 @@ NETWORKS, BUDGET = "/networks", "/budget"
 
 @dataclass(frozen=True)
 class MemberJob:
-    """One work item: a member to train; its result goes to ``path``."""
+    """One work item: a member to train; its result goes to ``path``.
+
+    ``shards`` is the index, ``samples`` are those shards of it that are read.
+    """
 
     member: Member
     path: Path
     shards: Path
+    samples: tuple[Path, ...]
     config: RunConfig
     provenance: Provenance
 
@@ -75,7 +79,7 @@ def build(stage: StageContext) -> Summary:
         train_member,
         jobs,
         stage.workers,
-        stage.executor_here(),
+        stage.executor,
         ahead_per_worker=64,
         store=stage.store,
     )
@@ -94,12 +98,15 @@ def build(stage: StageContext) -> Summary:
 
 def member_jobs(stage: StageContext) -> list[MemberJob]:
     """Every member of the family, its repeats, then those of the ablation."""
-    config = stage.config
+    config, shards = stage.config, stage.upstream("shards")
+    wanted = samples_wanted(config)
+    samples = [path for split in SPLITS for path in first_shards(shards, split, wanted[split])]
     return [
         MemberJob(
             member=member,
             path=stage.folder.state("sweep") / f"{member.name}.mcap",
-            shards=stage.upstream("shards"),
+            shards=shards,
+            samples=tuple(samples),
             config=config,
             provenance=stage.provenance(),
         )
@@ -107,11 +114,15 @@ def member_jobs(stage: StageContext) -> list[MemberJob]:
     ]
 
 
+def samples_wanted(config: RunConfig) -> dict[str, int]:
+    """Split to how many of its samples every member gets."""
+    held_out = config.sweep.held_out_samples
+    return {split: config.sweep.samples if split == "train" else held_out for split in SPLITS}
+
+
 def given_samples(config: RunConfig, shards: Path) -> dict[str, Samples]:
     """Split to what every member gets of it: its first samples, for splits are shuffled."""
-    held_out = config.sweep.held_out_samples
-    wanted = {split: config.sweep.samples if split == "train" else held_out for split in SPLITS}
-    return {split: first_samples(shards, split, count) for split, count in wanted.items()}
+    return {s: first_samples(shards, s, count) for s, count in samples_wanted(config).items()}
 
 
 def train_member(job: MemberJob) -> Path:

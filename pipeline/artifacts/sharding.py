@@ -89,20 +89,20 @@ def listed_shards(path: Path, splits: Iterable[str] = ("train", "val", "test")) 
         A wanted shard is missing, or a name in the index leads out of the folder.
     """
     wanted = set(splits)
-    shards = []
-    for entry in read_index(path).shards:
-        shard = path.parent / entry.path
-        if not shard.resolve().is_relative_to(path.parent.resolve()):
-            raise ArtifactError(
-                f"{path} names '{entry.path}', which leads out of its folder",
-                "The index is damaged: make it again",
-            )
-        if entry.split not in wanted:
-            continue
-        if not shard.is_file():
-            raise ArtifactError(
-                f"{shard} is missing, though {path} names it",
-                "Run the stage that makes it again: it makes the missing shard alone",
-            )
-        shards.append(shard)
-    return shards
+    return [shard_of(path, entry) for entry in read_index(path).shards if entry.split in wanted]
+
+
+def shard_of(index: Path, entry: ShardEntry) -> Path:
+    """The shard of an entry of an index. Raises ArtifactError as `listed_shards` does."""
+    shard = index.parent / entry.path
+    if not shard.resolve().is_relative_to(index.parent.resolve()):
+        raise ArtifactError(
+            f"{index} names '{entry.path}', which leads out of its folder",
+            "The index is damaged: make it again",
+        )
+    if not shard.is_file():
+        raise ArtifactError(
+            f"{shard} is missing, though {index} names it",
+            "Run the stage that makes it again: it makes the missing shard alone",
+        )
+    return shard

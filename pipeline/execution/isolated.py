@@ -30,6 +30,7 @@ import numpy as np
 
 from pipeline.errors import SoftgripError
 from pipeline.execution.executors import Executor, defer_interrupts
+from pipeline.execution.run_store import RunStore
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -89,12 +90,20 @@ class Isolation:
         What one item may take.
     executor
         Where they run. On Ray each node has processes of its own, beside Ray's.
+    store
+        Where nodes find the run's files; None: in its folder, as this process does.
     """
 
-    def __init__(self, workers: int, allowance: Allowance, executor: Executor = "local") -> None:
+    def __init__(
+        self,
+        workers: int,
+        allowance: Allowance,
+        executor: Executor = "local",
+        store: RunStore | None = None,
+    ) -> None:
         self._most = max(1, workers)
         self._allowance = allowance
-        self._executor = executor
+        self._executor, self._store = executor, store
         self._workers: list[_Worker] = []
 
     def __enter__(self) -> Self:
@@ -136,7 +145,7 @@ class Isolation:
             from pipeline.execution.ray_executor import job_by_name, run_on_ray
 
             apart = partial(run_apart, job_by_name(job), self._allowance)
-            yield from run_on_ray(apart, items, Lost)
+            yield from run_on_ray(apart, items, Lost, store=self._store)
             return
         waiting, ended = enumerate(items), False
         outcomes: dict[int, Any] = {}

@@ -1,26 +1,39 @@
-"""Work items as bytes for another process of this run; the configuration is packed once.
+"""Work items, and what is made of them, as bytes for another process of this run.
 
 Every item of a stage holds the run's configuration. To pack it anew was more than half of what an
 item that does nothing costs the driver, and a tenth of what stage grasps' driver spends. So its
 bytes are kept, and a worker that gets the same bytes again takes the configuration that it has.
+
+Where the other process has the run's files in another place, paths travel as keys.
 """
 
 import io
 import pickle
+from collections.abc import Callable, Mapping
 from functools import lru_cache
+from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from pipeline.config import RunConfig
 
 _CONFIGURATIONS = 2  # kept in a worker: the items of a stage hold one
+_NONE: Mapping[str, str] = MappingProxyType({})  # no module is called otherwise
 
 
 class ItemPacker:
-    """Packs items that share configurations; one for all items of a stage."""
+    """Packs items that share configurations; one for all items of a stage.
 
-    def __init__(self) -> None:
+    Parameters
+    ----------
+    key_of
+        Gives the key that a path travels as; None: paths travel as they are.
+    """
+
+    def __init__(self, key_of: Callable[[Path], str] | None = None) -> None:
         # By identity: a configuration is kept beside its bytes, so that nothing else takes its id.
         self._kept: dict[int, tuple[RunConfig, bytes]] = {}
+        self._pickler = _Pickler if key_of is None else _pickler_with_keys(key_of)
 
     def pack(self, item: Any) -> bytes:
         """Pickle an item.
@@ -35,7 +48,7 @@ class ItemPacker:
         The pickle, for `unpack_item`.
         """
         buffer = io.BytesIO()
-        _Pickler(buffer, self).dump(item)
+        self._pickler(buffer, self).dump(item)
         return buffer.getvalue()
 
     def bytes_of(self, config: RunConfig) -> bytes:
@@ -56,9 +69,47 @@ class _Pickler(pickle.Pickler):
         return NotImplemented
 
 
-def unpack_item(data: bytes) -> Any:
-    """What `ItemPacker.pack` was given, in another process of this run."""
-    return pickle.loads(data)  # noqa: S301 - our own bytes
+def _pickler_with_keys(key_of: Callable[[Path], str]) -> type[_Pickler]:
+    """A pickler whose paths are keys; the others are not asked for every value they meet."""
+
+    class Pickler(_Pickler):
+        def persistent_id(self, value: Any) -> str | None:
+            return key_of(value) if isinstance(value, Path) else None
+
+    return Pickler
+
+
+def unpack_item(
+    data: bytes,
+    renamed: Mapping[str, str] = _NONE,
+    path_of: Callable[[str], Path] | None = None,
+) -> Any:
+    """What another process of this run has packed.
+
+    Parameters
+    ----------
+    data
+        Of `ItemPacker.pack`.
+    renamed
+        Module there → its name here.
+    path_of
+        Gives the path here of a key; None where no path travels as a key.
+
+    Returns
+    -------
+    The value.
+    """
+
+    class Unpickler(pickle.Unpickler):
+        def find_class(self, module_name: str, global_name: str) -> Any:
+            return super().find_class(renamed.get(module_name, module_name), global_name)
+
+        def persistent_load(self, key: str) -> Path:
+            if path_of is None:
+                raise pickle.UnpicklingError("a key, and no folder of a run")
+            return path_of(key)
+
+    return Unpickler(io.BytesIO(data)).load()
 
 
 @lru_cache(maxsize=_CONFIGURATIONS)

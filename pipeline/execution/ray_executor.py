@@ -12,17 +12,17 @@ import sys
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
 
 from pipeline.errors import MachineError, SoftgripError
 from pipeline.execution.executors import too_long
-from pipeline.execution.packed_items import ItemPacker
+from pipeline.execution.packed_items import ItemPacker, unpack_item
 from pipeline.execution.ray_cluster import MOST_RETRIES, connected, enter
 from pipeline.execution.run_store import Place, RunStore
-from pipeline.execution.stored_items import Done, packed, run_from_store, unpacked
+from pipeline.execution.stored_items import Done, run_from_store
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -131,26 +131,27 @@ class Sending:
         Where nodes find the run's files; None: in the folder that this process works in.
     bring
         Whether the files that nodes put in the store come to the run's folder here.
-    packer
-        Packs items where no path travels as a key.
     """
 
     store: RunStore | None = None
     bring: bool = True
-    packer: ItemPacker = field(default_factory=ItemPacker)
+
+    @cached_property
+    def packer(self) -> ItemPacker:
+        """Packs all items; with a store their paths travel as keys."""
+        return ItemPacker(self.store.roots.key_of if self.store else None)
 
     def message(self, job: JobByName, item: Any) -> tuple[bytes, str | Place, str]:
         """What `_run_there` is given."""
-        if self.store is None:
-            return self.packer.pack((job, item)), str(Path.cwd()), program_name()
-        return packed((job, item), self.store.folder.path), self.store.place, program_name()
+        place = self.store.place if self.store else str(Path.cwd())
+        return self.packer.pack((job, item)), place, program_name()
 
     def result(self, answer: bytes) -> Any:
         """What the job made; files that its node put in the store are here."""
         names = {program_name(): "__main__"}
         if self.store is None:
-            return unpacked(answer, names)
-        done: Done = unpacked(answer, names, self.store.folder.path.joinpath)
+            return unpack_item(answer, names)
+        done: Done = unpack_item(answer, names, self.store.roots.path_of)
         if self.bring:
             self.store.bring(done.put, done.removed)
         return done.result
@@ -299,5 +300,5 @@ def _run_there(sent: bytes, place: str | Place, program: str) -> bytes:
     if isinstance(place, Place):
         return run_from_store(sent, place, program)
     enter(place)
-    job, item = unpacked(sent, {"__main__": program})
-    return packed(job(item), None)
+    job, item = unpack_item(sent, {"__main__": program})
+    return ItemPacker().pack(job(item))

@@ -8,7 +8,7 @@ store holds the run, and a folder that is lost, or empty on another machine, is 
 import json
 import os
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,7 +22,9 @@ from pipeline.config.store import StoreConfig
 from pipeline.config.tree import load_run_config
 from pipeline.errors import ConfigError
 from pipeline.execution.run_folder import RunFolder
+from pipeline.execution.run_roots import LENT, RunRoots
 from pipeline.execution.store_lease import CLOCK, LEASE, Lease
+from pipeline.progress import progress
 
 VARIABLE = "RUN_STORE"
 NOTES = "store.json"  # in the run's state: what the store and the folder last had in common
@@ -30,8 +32,8 @@ STATE = ".state"
 # Of one machine, or made again in no time: Make's stamps, locks, memories and caches.
 OF_THIS_MACHINE = ("lock", "owner", "mesh_dir", "renderer.json", NOTES, "query", "samples", MEMO)
 STAMPS = (".key", ".lock")
-# Scattered samples are on their way from node to node.
-PASSING = (STATE, "shards")
+# On their way to a node: scattered samples, and files of a folder outside the run.
+PASSING = ((STATE, "shards"), tuple(LENT.split("/")))
 NOT_OF_STAGES = ("logs", "export", "publish", "real", "robot")  # folders that goals beside write
 LOOKED_AT_S = 10.0  # a person waits for `make status`: no longer for a store that does not answer
 PUT_EVERY_S = 30.0  # while local processes work: what a killed machine may lose
@@ -90,7 +92,37 @@ class RunStore:
     def __init__(self, store: ObjectStore, folder: RunFolder, place: Place, lease: Lease) -> None:
         self.place, self._store, self.folder, self._lease = place, store, folder, lease
         self._notes = read_notes(folder)
+        self._lent: Path | None = None
         self._last_put = time.monotonic()
+
+    @property
+    def roots(self) -> RunRoots:
+        """The folders here whose files an item may name."""
+        return RunRoots(self.folder.path, self._lent, self.folder.cache)
+
+    @contextmanager
+    def lending(self, folder: Path, files: Sequence[Path]) -> Iterator[None]:
+        """Within the block items may name files of a folder outside the run, too.
+
+        Parameters
+        ----------
+        folder
+            That folder, here.
+        files
+            Those of its files that are put for the nodes; they are removed after the block.
+
+        Raises
+        ------
+        StoreError
+            The store cannot be used, or another driver has taken the run.
+        """
+        self._lease.check()
+        self._lent = folder
+        for path in progress(files, len(files), "store: files that nodes read", "file"):
+            self._store.put(self.roots.key_of(path), path)
+        yield
+        self._lent = None
+        self.discard(self.folder.path / LENT)
 
     def pull(self) -> int:
         """Bring what is new in the store; what changed here alone stays. How many files came."""
@@ -295,7 +327,7 @@ def look(folder: RunFolder) -> list[str]:
 def belongs_to_run(key: str) -> bool:
     """Whether a file, named below the run's folder, is kept in the store by the driver."""
     parts = tuple(key.split("/"))
-    if key in (LEASE, CLOCK) or parts[-1].endswith(SCRATCH_SUFFIX) or parts[:2] == PASSING:
+    if key in (LEASE, CLOCK) or parts[-1].endswith(SCRATCH_SUFFIX) or parts[:2] in PASSING:
         return False
     if parts[0] == STATE:
         own = parts[1] in OF_THIS_MACHINE or parts[1].startswith("hashes")

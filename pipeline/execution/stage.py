@@ -2,10 +2,9 @@
 
 import math
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
-
-from loguru import logger
 
 from pipeline.artifacts import Input, Provenance, package_version
 from pipeline.config import RunConfig
@@ -120,12 +119,16 @@ class StageContext:
         """Whether work items run in other processes than this one."""
         return self.executor != "local" or self.workers > 1
 
-    def executor_here(self) -> Executor:
-        """Where work runs whose files are none of the run's: with a store here, which is told."""
-        if self.store is None or self.executor == "local":
-            return self.executor
-        logger.info("{}: its work stays on this machine, the run lies in a store", self.name)
-        return "local"
+    @property
+    def works_from_store(self) -> bool:
+        """Whether work items run on nodes that take files from the run's store."""
+        return self.store is not None and self.executor != "local"
+
+    def lending(self, folder: Path | None, files: Sequence[Path]) -> AbstractContextManager[None]:
+        """Nodes that take files from the store have these files of a folder outside the run."""
+        if folder is None or self.store is None or not self.works_from_store:
+            return nullcontext()
+        return self.store.lending(folder, files)
 
     @property
     def recording_id(self) -> str:

@@ -1,20 +1,19 @@
 """A work item on a node that has no folder in common with the driver.
 
-An item names its files by paths below the run's folder. They travel as keys, and on the node they
-are paths below a folder of the process that works on it. Before the job, files that the store has
-are brought there; after it, files that the job has written are put, each if nobody else has
-written it meanwhile, and those that it has removed are removed. So jobs know nothing of stores.
+An item names its files by paths below the run's folder, or below one that is lent to the run. They
+travel as keys, and on the node they are paths below a folder of the process that works on it.
+Before the job, files that the store has are brought there; after it, files that the job has written
+are put, each if nobody else has written it meanwhile, and those that it has removed are removed. So
+jobs know nothing of stores.
 
 A node keeps what it has brought by version, for all its processes; a process has links to it.
 """
 
 import functools
 import hashlib
-import io
 import os
-import pickle
 import tempfile
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -27,6 +26,8 @@ from pipeline.artifacts.publishing import (
     scratch_beside,
 )
 from pipeline.errors import StoreError
+from pipeline.execution.packed_items import ItemPacker, unpack_item
+from pipeline.execution.run_roots import LENT, RunRoots, is_in_store
 from pipeline.execution.run_store import Place, mark_of
 
 CACHE_VARIABLE = "RUN_STORE_CACHE"  # of a node: where it keeps files; else the system's folder
@@ -42,79 +43,13 @@ class Done:
     removed: tuple[str, ...]
 
 
-def packed(value: Any, run: Path | None) -> bytes:
-    """Pickle a value for another process of this run.
-
-    Parameters
-    ----------
-    value
-        A picklable value.
-    run
-        The run's folder here, whose paths travel as keys; None: all paths travel as they are.
-
-    Returns
-    -------
-    The pickle.
-    """
-    if run is None:
-        return pickle.dumps(value)
-    below = run.absolute()
-
-    class Pickler(pickle.Pickler):
-        def persistent_id(self, value: Any) -> str | None:
-            if not isinstance(value, Path):
-                return None
-            path = value.absolute()
-            if not path.is_relative_to(below):
-                raise StoreError(
-                    f"{value} is no file of the run, and nodes without a common folder have it not",
-                    "Work on it with EXECUTOR=local",
-                )
-            return path.relative_to(below).as_posix()
-
-    buffer = io.BytesIO()
-    Pickler(buffer).dump(value)
-    return buffer.getvalue()
-
-
-def unpacked(
-    data: bytes, renamed: dict[str, str], path_of: Callable[[str], Path] | None = None
-) -> Any:
-    """What was pickled by another process of this run.
-
-    Parameters
-    ----------
-    data
-        The pickle, of `packed`.
-    renamed
-        Module there → its name here.
-    path_of
-        Gives the path here of a key; None where no path travels as a key.
-
-    Returns
-    -------
-    The value.
-    """
-
-    class Unpickler(pickle.Unpickler):
-        def find_class(self, module_name: str, global_name: str) -> Any:
-            return super().find_class(renamed.get(module_name, module_name), global_name)
-
-        def persistent_load(self, key: str) -> Path:
-            if path_of is None:
-                raise pickle.UnpicklingError("a key, and no folder of a run")
-            return path_of(key)
-
-    return Unpickler(io.BytesIO(data)).load()
-
-
 def run_from_store(sent: bytes, place: Place, program: str) -> bytes:
-    """On a node: a pickled job and item in, `Done` out, pickled.
+    """On a node: a packed job and item in, `Done` out, packed.
 
     Parameters
     ----------
     sent
-        Job and item, of `packed`.
+        Job and item, of `ItemPacker.pack`.
     place
         Where the run lies.
     program
@@ -122,21 +57,20 @@ def run_from_store(sent: bytes, place: Place, program: str) -> bytes:
 
     Returns
     -------
-    The pickle of `Done`.
+    `Done`, packed.
     """
     node = node_folder(place)
     keys: dict[str, None] = {}
 
     def path_of(key: str) -> Path:
         keys[key] = None
-        return node.run / key
+        return node.roots.path_of(key)
 
-    job, item = unpacked(sent, {"__main__": program}, path_of)
-    named = list(keys)
-    node.bring(named)
+    job, item = unpack_item(sent, {"__main__": program}, path_of)
+    node.bring([key for key in keys if is_in_store(key)])
     result = job(item)
     put, removed = node.put_back()
-    return packed(Done(result, tuple(put), tuple(removed)), node.run)
+    return ItemPacker(node.roots.key_of).pack(Done(result, tuple(put), tuple(removed)))
 
 
 class NodeFolder:
@@ -162,6 +96,7 @@ class NodeFolder:
         self._kept.mkdir(exist_ok=True)
         self.run = scratch_beside(root / name)
         self.run.mkdir()
+        self.roots = RunRoots(self.run, self.run / LENT, root / f"{name}.cache")
         self._brought: dict[str, str | None] = {}  # key → version in the store
         self._marks: dict[str, tuple[int, int, int] | None] = {}  # key → the file as brought
 

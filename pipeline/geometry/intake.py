@@ -5,6 +5,7 @@ What our own geometry trips over in a mesh is a reason to leave that mesh out, a
 
 import traceback
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -22,12 +23,34 @@ from pipeline.geometry.catalogue import (
 from pipeline.geometry.mesh_files import MeshSource
 from pipeline.geometry.object_names import readable_name
 from pipeline.geometry.parametric import PARAMETRIC_OBJECTS, parametric_source
-from pipeline.geometry.urdf_files import load_object_file, standalone
+from pipeline.geometry.urdf_files import load_object_file, read_with, standalone
 
 Result = TypeVar("Result")
 
-Source = tuple[Path | None, str]
-"""A mesh file and its path in its folder; None and the name of an embedded object."""
+
+@dataclass(frozen=True)
+class Source:
+    """Where an object comes from.
+
+    Attributes
+    ----------
+    path
+        A mesh file or a URDF; None: it is an embedded object.
+    label
+        The file's path in its folder, or the object's name.
+    read_with
+        Further files that it is read with, named where another machine is to have them too.
+    """
+
+    path: Path | None
+    label: str
+    read_with: tuple[Path, ...] = ()
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All files that it is read from."""
+        return (self.path, *self.read_with) if self.path else ()
+
 
 # How numerical code fails on numbers that nobody thought of. Not among them are a full disk, and
 # what is wrong in our code whatever the mesh: a name or a type.
@@ -57,21 +80,39 @@ def all_sources(
     MeshError
         A mesh has the name of an embedded object that would stand beside it.
     """
-    embedded: list[Source] = [(None, name) for name in sorted(PARAMETRIC_OBJECTS)]
+    embedded: list[Source] = [Source(None, name) for name in sorted(PARAMETRIC_OBJECTS)]
     if folder is None:
         return embedded, frozenset()
     meshes: list[Source] = [
-        (path, path.relative_to(folder).as_posix()) for path in standalone(list(paths), folder)
+        Source(path, path.relative_to(folder).as_posix())
+        for path in standalone(list(paths), folder)
     ]
     if not embedded_beside:
         return meshes, frozenset()
-    for path, label in meshes:
-        if readable_name(label) in PARAMETRIC_OBJECTS:
+    for source in meshes:
+        if readable_name(source.label) in PARAMETRIC_OBJECTS:
             raise MeshError(
-                f"{path} has the name of an embedded object",
+                f"{source.path} has the name of an embedded object",
                 "Rename the file, or set objects.embedded_in_training = false",
             )
     return meshes + embedded, frozenset(PARAMETRIC_OBJECTS)
+
+
+def with_all_files(
+    sources: Sequence[Source], folder: Path | None, config: ObjectsConfig
+) -> list[Source]:
+    """The sources with the names of all files that they are read from."""
+    return [
+        replace(source, read_with=read_with(source.path, folder, config))
+        if source.path and folder
+        else source
+        for source in sources
+    ]
+
+
+def files_of(sources: Sequence[Source]) -> list[Path]:
+    """The files that sources name, each once."""
+    return list(dict.fromkeys(path for source in sources for path in source.files))
 
 
 def measured_or_why_not(
@@ -92,14 +133,13 @@ def measured_or_why_not(
     -------
     The object at its own size, or the reason.
     """
-    path, label = source
 
     def loaded() -> MeshSource:
-        if path is None or folder is None:
-            return parametric_source(label)
-        return load_object_file(path, folder, label, config)
+        if source.path is None or folder is None:
+            return parametric_source(source.label)
+        return load_object_file(source.path, folder, source.label, config)
 
-    return made_or_why_not(label, lambda: measure_object(loaded(), config))
+    return made_or_why_not(source.label, lambda: measure_object(loaded(), config))
 
 
 def finished_or_why_not(

@@ -1,6 +1,7 @@
 """Reading mesh files: bounded, nothing outside their folder, units declared or detected."""
 
 import hashlib
+import os
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -94,6 +95,23 @@ def read_surface(path: Path, folder: Path, config: ObjectsConfig) -> tuple[Surfa
     for more in surface.beside:
         digest.update(more)
     return surface, digest.hexdigest()
+
+
+def files_beside(path: Path, folder: Path, config: ObjectsConfig) -> tuple[Path, ...]:
+    """Files of the folder that a glTF keeps its data in; none for another mesh.
+
+    One that cannot be read names none; reading it says why.
+    """
+    if path.suffix.lower() not in _GLTF_SUFFIXES:
+        return ()
+    label = path.relative_to(folder).as_posix()
+    try:
+        names = gltf.files_named(label, _bytes_of(label, path, folder, config))
+    except MeshError:
+        return ()
+    found = [Path(os.path.normpath(path.parent / unquote(name))) for name in names]
+    root = folder.resolve()
+    return tuple(f for f in found if f.is_file() and f.resolve().is_relative_to(root))
 
 
 def _bytes_of(label: str, path: Path, folder: Path, config: ObjectsConfig) -> bytes:

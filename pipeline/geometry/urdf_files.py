@@ -5,6 +5,7 @@ for beside the URDF and in its folder, never outside; URDF is in metres by its d
 """
 
 import hashlib
+import os
 import re
 from contextlib import suppress
 from pathlib import Path
@@ -20,7 +21,7 @@ from pipeline.config.objects import ObjectsConfig
 from pipeline.errors import MeshError
 from pipeline.geometry.formats.surface import check_faces_allowed, check_finite
 from pipeline.geometry.mesh import Mesh
-from pipeline.geometry.mesh_files import MeshSource, load_mesh_file, read_surface
+from pipeline.geometry.mesh_files import MeshSource, files_beside, load_mesh_file, read_surface
 from pipeline.geometry.mesh_folders import MESH_SUFFIXES
 from pipeline.geometry.units import length_unit
 
@@ -52,6 +53,35 @@ def standalone(files: list[Path], folder: Path) -> list[Path]:
             except MeshError:
                 continue
     return [path for path in files if path.resolve() not in placed]
+
+
+def read_with(path: Path, folder: Path, config: ObjectsConfig) -> tuple[Path, ...]:
+    """Files of the folder that an object's file is read with: a URDF's meshes, a glTF's data.
+
+    One that cannot be read names none; loading it says why.
+
+    Parameters
+    ----------
+    path
+        A mesh or a URDF.
+    folder
+        The mesh folder.
+    config
+        Bounds of files.
+
+    Returns
+    -------
+    The files, each once.
+    """
+    if path.suffix.lower() != URDF_SUFFIX:
+        return files_beside(path, folder, config)
+    found: dict[Path, None] = {}
+    with suppress(MeshError):
+        for reference in [m.get("filename", "") for m in _root(path, folder).iter("mesh")]:
+            with suppress(MeshError):
+                mesh = Path(os.path.normpath(_named(reference, path, folder)))
+                found |= dict.fromkeys((mesh, *files_beside(mesh, folder, config)))
+    return tuple(found)
 
 
 def load_urdf_file(path: Path, folder: Path, name: str, config: ObjectsConfig) -> MeshSource:
@@ -266,7 +296,14 @@ def _shape(
 
 
 def _resolved(reference: str, urdf: Path, folder: Path) -> Path:
-    """The file that a URDF names. Raises MeshError where it is missing or outside the folder.
+    """The file that a URDF names, links followed. Raises MeshError as `_named` does."""
+    return _named(reference, urdf, folder).resolve()
+
+
+def _named(reference: str, urdf: Path, folder: Path) -> Path:
+    """The file that a URDF names, by its path in the folder.
+
+    Raises MeshError where it is missing or outside the folder.
 
     A ``package://`` may stand for any folder from the URDF's up to the folder of meshes, with or
     without the package's name; a path may have backslashes and percent escapes.
@@ -277,10 +314,10 @@ def _resolved(reference: str, urdf: Path, folder: Path) -> Path:
     bases = [urdf.parent, *(up for up in urdf.parent.parents if up.is_relative_to(folder))]
     written = _paths_meant(label, reference)
     candidates = [base / part for part in written for base in bases]
-    found = [path.resolve() for path in candidates if _is_file(path)]
+    found = [path for path in candidates if _is_file(path)]
     if not found:
         raise MeshError(f"{label} places '{reference}', which is not there", "Put it there")
-    inside = [path for path in found if path.is_relative_to(root)]
+    inside = [path for path in found if path.resolve().is_relative_to(root)]
     if not inside:
         raise MeshError(
             f"{label} places '{reference}', which leads out of its folder",

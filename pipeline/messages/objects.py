@@ -1,11 +1,13 @@
 """Catalogue objects ↔ softgrip.v1.CatalogueObject."""
 
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import cast, get_args
 
 import numpy as np
 
+from pipeline.artifacts import ArtifactWriter, Provenance
 from pipeline.artifacts.names import file_name
 from pipeline.artifacts.reading import open_artifact
 from pipeline.artifacts.tensors import set_tensors, tensors_of, to_tensor
@@ -53,6 +55,21 @@ def object_message(item: CatalogueObject, split: str) -> objects_pb2.CatalogueOb
         family=item.family,
         copies=item.copies,
     )
+
+
+def write_objects(
+    path: Path,
+    provenance: Provenance,
+    objects: Sequence[CatalogueObject],
+    split: Mapping[str, str],
+    refused: Sequence[objects_pb2.RefusedMesh],
+) -> None:
+    """Write a catalogue: its objects with their splits, and the meshes that became none."""
+    with ArtifactWriter(path, provenance) as artifact:
+        for index, item in enumerate(objects):
+            artifact.write(TOPIC, object_message(item, split[item.name]), log_time_ns=index)
+        for index, message in enumerate(refused):
+            artifact.write(REFUSED_TOPIC, message, log_time_ns=index)
 
 
 def object_of(message: objects_pb2.CatalogueObject) -> CatalogueObject:

@@ -17,7 +17,7 @@ from filelock import FileLock
 
 from pipeline.artifacts.publishing import file_sha256, published_folder, write_error
 from pipeline.artifacts.reading import open_artifact
-from pipeline.artifacts.sharding import listed_shards, read_index
+from pipeline.artifacts.sharding import listed_shards, read_index, shard_of
 from pipeline.errors import ArtifactError
 from pipeline.messages.samples import STORED_AS, read_samples
 from pipeline.network.samples import Samples, join_samples
@@ -112,7 +112,7 @@ def first_samples(index: Path, split: str, wanted: int) -> Samples:
     """
     parts: list[Samples] = []
     found = 0
-    for part in read_parts(index, split):
+    for part in _parts(first_shards(index, split, wanted)):
         parts.append(part.take(slice(0, wanted - found)))
         found += len(parts[-1])
         if found == wanted:
@@ -120,6 +120,19 @@ def first_samples(index: Path, split: str, wanted: int) -> Samples:
     if not found:
         raise _empty_split()
     return join_samples(parts)
+
+
+def first_shards(index: Path, split: str, wanted: int) -> dict[Path, ShardEntry]:
+    """The shards that hold the first samples of a split, each with what the index says of it.
+
+    Raises ArtifactError where one of them is missing; the others need not be there.
+    """
+    needed, found = {}, 0
+    for entry in _entries(index, split):
+        if found < wanted:
+            needed[shard_of(index, entry)] = entry
+        found += entry.samples
+    return needed
 
 
 def cache_key(entries: Iterable[ShardEntry]) -> str:

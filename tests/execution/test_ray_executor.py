@@ -39,7 +39,7 @@ def test_a_job_travels_with_its_arguments(job: Callable[[str], str], made: str) 
 PROGRAM = """
 from dataclasses import dataclass
 from pipeline.execution.ray_executor import job_by_name, program_name
-from pipeline.execution.stored_items import packed, unpacked
+from pipeline.execution.packed_items import ItemPacker, unpack_item
 
 @dataclass(frozen=True)
 class Item:
@@ -50,11 +50,11 @@ def job(item):
     return Item(item.number + 1)
 
 if __name__ == "__main__":
-    sent = packed((job_by_name(job), Item(1)), None)
+    sent = ItemPacker().pack((job_by_name(job), Item(1)))
     import program  # a second time, as a node does: its classes are others
-    named, item = unpacked(sent, {"__main__": program_name()})
+    named, item = unpack_item(sent, {"__main__": program_name()})
     assert isinstance(item, program.Item) and not isinstance(item, Item)
-    result = unpacked(packed(named(item), None), {program_name(): "__main__"})
+    result = unpack_item(ItemPacker().pack(named(item)), {program_name(): "__main__"})
     assert result == Item(2), result
     print("done")
 """

@@ -1,6 +1,5 @@
 """An item's files travel as keys, and a node takes them from the store and puts them back."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -9,17 +8,10 @@ from obstore.store import MemoryStore
 from pipeline.artifacts.object_store import ObjectStore
 from pipeline.errors import StoreError
 from pipeline.execution.run_store import Place
-from pipeline.execution.stored_items import NodeFolder, packed, unpacked
+from pipeline.execution.stored_items import NodeFolder
 
 URL = "s3://bucket/run"
 MIB = 2**20
-
-
-@dataclass(frozen=True)
-class Item:
-    source: Path
-    target: Path
-    below: Path
 
 
 @pytest.fixture
@@ -29,21 +21,6 @@ def store() -> ObjectStore:
 
 def node(store: ObjectStore, root: Path, cache_mib: int = 100) -> NodeFolder:
     return NodeFolder(Place(URL, cache_mib, 1.0), root, store)
-
-
-def test_files_of_the_run_travel_as_keys_from_folder_to_folder(tmp_path: Path) -> None:
-    run = tmp_path / "runs" / "ci"
-    item = Item(run / "a.mcap", run / ".state" / "scenes" / "b.mcap", run)
-    there = unpacked(packed(item, run), {}, (tmp_path / "node").joinpath)
-    at = tmp_path / "node"
-    assert there == Item(at / "a.mcap", at / ".state" / "scenes" / "b.mcap", at)
-    assert unpacked(packed(there, at), {}, run.joinpath) == item
-    assert str(tmp_path).encode() not in packed(item, run)
-
-
-def test_a_file_outside_the_run_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(StoreError, match="is no file of the run"):
-        packed(tmp_path / "mesh.ply", tmp_path / "runs")
 
 
 def test_what_a_job_writes_is_put_and_what_it_removes_is_removed(

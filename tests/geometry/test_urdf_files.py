@@ -11,7 +11,7 @@ from pipeline.errors import MeshError
 from pipeline.geometry.catalogue import finish_object, measure_object
 from pipeline.geometry.mesh_folders import list_mesh_files
 from pipeline.geometry.shape import volume
-from pipeline.geometry.urdf_files import load_object_file, standalone
+from pipeline.geometry.urdf_files import load_object_file, read_with, standalone
 
 CONFIG = ObjectsConfig()
 BOX = trimesh.creation.box(extents=(100.0, 50.0, 20.0))  # in mm, as CAD writes it
@@ -160,3 +160,39 @@ def test_entities_do_not_reach_files(folder: Path) -> None:
     )
     with pytest.raises(MeshError, match="no XML"):
         load_object_file(path, folder, "thing", CONFIG)
+
+
+def test_every_file_that_an_object_is_read_from_is_named(tmp_path: Path) -> None:
+    meshes, urdfs = tmp_path / "meshes", tmp_path / "urdf"
+    meshes.mkdir()
+    urdfs.mkdir()
+    ball = trimesh.Scene(trimesh.creation.icosphere(1, 0.03))
+    files = trimesh.exchange.gltf.export_gltf(ball)
+    for name, data in files.items():
+        (meshes / name).write_bytes(data)
+    BOX.export(meshes / "box.obj")
+    body = visual('<mesh filename="../meshes/model.gltf"/>') + visual(
+        '<mesh filename="package://meshes/box.obj"/>'
+    )
+    path = write_urdf(urdfs, body, visual('<mesh filename="missing.obj"/>'))
+    named = read_with(path, tmp_path, CONFIG)
+    assert set(named) == {meshes / name for name in (*files, "box.obj")}
+    assert read_with(meshes / "box.obj", tmp_path, CONFIG) == ()
+
+
+@pytest.mark.parametrize("text", ["no XML", '{"buffers": [{"uri": 3}]}', '{"buffers": 5}', "{"])
+@pytest.mark.parametrize("name", ["thing.urdf", "thing.gltf"])
+def test_a_damaged_file_names_no_others(tmp_path: Path, name: str, text: str) -> None:
+    (tmp_path / name).write_text(text)
+    assert read_with(tmp_path / name, tmp_path, CONFIG) == ()
+
+
+def test_no_file_outside_the_folder_is_named(tmp_path: Path) -> None:
+    folder = tmp_path / "meshes"
+    folder.mkdir()
+    BOX.export(tmp_path / "box.obj")
+    (tmp_path / "data.bin").write_bytes(b"0")
+    (folder / "a.gltf").write_text('{"buffers": [{"uri": "../data.bin"}, {"uri": "http://x"}]}')
+    path = write_urdf(folder, visual('<mesh filename="../box.obj"/>'))
+    assert read_with(path, folder, CONFIG) == ()
+    assert read_with(folder / "a.gltf", folder, CONFIG) == ()

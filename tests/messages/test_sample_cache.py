@@ -1,5 +1,6 @@
 """Shards are decoded once, in order, for as long as their content is the same."""
 
+import shutil
 from dataclasses import fields
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from pipeline.artifacts import ArtifactWriter, Provenance
 from pipeline.artifacts.publishing import scratch_beside
 from pipeline.artifacts.sharding import shard_entry, shard_path, write_index
 from pipeline.errors import ArtifactError
-from pipeline.messages.sample_cache import cached_split, first_samples, read_parts
+from pipeline.messages.sample_cache import cached_split, first_samples, first_shards, read_parts
 from pipeline.messages.samples import read_chosen, read_rows, read_split, write_samples
 from pipeline.network.samples import Samples, join_samples
 
@@ -149,6 +150,19 @@ def test_of_the_first_samples_no_later_shard_is_opened(
         first_samples(index, "train", 8)
     with pytest.raises(ArtifactError, match="is not the shard that its index names"):
         list(read_parts(index, "train"))
+
+
+def test_the_first_samples_need_no_other_shard(tmp_path: Path, provenance: Provenance) -> None:
+    index = sharded(tmp_path, provenance, PARTS)
+    alone = tmp_path / "alone"
+    for path in (index, *first_shards(index, "train", 7)):
+        there = alone / path.relative_to(tmp_path)
+        there.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(path, there)
+    found = first_samples(alone / index.relative_to(tmp_path), "train", 7)
+    np.testing.assert_array_equal(found.cloud, join_samples(PARTS).cloud[:7])
+    with pytest.raises(ArtifactError, match=r"00001-of-00003\.mcap is missing"):
+        first_samples(alone / index.relative_to(tmp_path), "train", 8)
 
 
 def test_a_split_of_no_samples_has_no_first_ones(tmp_path: Path, provenance: Provenance) -> None:

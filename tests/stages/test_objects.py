@@ -242,10 +242,10 @@ def test_a_run_takes_meshes_or_embedded_objects_unless_told_otherwise(
     tmp_path: Path, mesh_dir: Path
 ) -> None:
     jobs, added = objects.sources(context(tmp_path / "a", mesh_dir, ""))
-    assert sorted(name for _, name in jobs) == [f"box_{number}.ply" for number in range(7)]
+    assert sorted(job.label for job in jobs) == [f"box_{number}.ply" for number in range(7)]
     assert not added
     jobs, added = objects.sources(context(tmp_path / "b", None, BESIDE))
-    assert {name for _, name in jobs} == set(PARAMETRIC_OBJECTS)
+    assert {job.label for job in jobs} == set(PARAMETRIC_OBJECTS)
     assert not added
 
 

@@ -16,21 +16,41 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+import trimesh
 
 from pipeline.artifacts.object_store import ObjectStore, TakenError
 from pipeline.config import load_run_config
 from pipeline.errors import StoreError
 from pipeline.execution import RunFolder, StageContext
+from pipeline.execution.run_roots import LENT
 from pipeline.execution.run_store import RunStore, look, opened
+from pipeline.execution.stage import Stage
 from pipeline.execution.staleness import stage_context
-from stages import grasps, shards
-from stages.graph import GRASPS, SHARDS, inputs_of
+from stages import grasps, objects, shards, sweep
+from stages.graph import GRASPS, OBJECTS, SHARDS, SWEEP, inputs_of
 from tests.artifacts.s3.server import BUCKET, s3_server
 from tests.stages.conftest import ROOT
 
 cluster_utils = pytest.importorskip("ray.cluster_utils", reason="Ray is not installed")
 PATIENCE_S = 300
 URL = f"s3://{BUCKET}/runs"
+
+ROD = """
+<robot name="rod"><link name="rod"><visual><geometry>
+<mesh filename="../parts/rod.stl"/>
+</geometry></visual></link></robot>
+"""
+ONE_NETWORK = """
+[sweep]
+depths = [18]
+channels = [[8, 8, 16, 16]]
+seeds = 1
+ablation_seeds = 0
+samples = 32
+held_out_samples = 16
+epochs = 1
+batch_size = 16
+"""
 
 # Python calls this at the start of every process of a node.
 GUARD = """
@@ -83,10 +103,10 @@ def cluster(
     made.shutdown()
 
 
-def context_of(stage: object, folder: RunFolder, store: RunStore | None) -> StageContext:
-    assert stage in (GRASPS, SHARDS)
-    of = GRASPS if stage is GRASPS else SHARDS
-    context = stage_context(of, folder, inputs_of, None, workers=1)
+def context_of(
+    stage: Stage, folder: RunFolder, store: RunStore | None, mesh_dir: Path | None = None
+) -> StageContext:
+    context = stage_context(stage, folder, inputs_of, mesh_dir, workers=1)
     return replace(context, store=store, executor="ray" if store else "local")
 
 
@@ -157,6 +177,44 @@ def test_two_nodes_without_a_common_folder_make_the_bytes_of_local_processes(
     assert not [key for key in held if key.startswith(".state/shards")]  # all gathered
     (line,) = look(elsewhere)
     assert line.startswith(f"store: {URL}/tiny can be written and holds")
+
+
+def write_meshes(folder: Path) -> Path:
+    """A mesh, a glTF that keeps its data beside it, and a URDF that places a mesh; the folder."""
+    for name in ("", "urdf", "parts"):
+        (folder / name).mkdir(parents=True)
+    trimesh.creation.box((0.05, 0.06, 0.07)).export(folder / "box.ply")
+    files = trimesh.exchange.gltf.export_gltf(trimesh.Scene(trimesh.creation.icosphere(2, 0.04)))
+    for name, data in files.items():
+        (folder / name.replace("model", "ball")).write_bytes(data)
+    trimesh.creation.cylinder(0.02, 0.1).export(folder / "parts" / "rod.stl")
+    (folder / "urdf" / "rod.urdf").write_text(ROD)
+    return folder
+
+
+@pytest.mark.usefixtures("in_store", "cluster")
+def test_nodes_read_meshes_and_train_networks_that_only_the_driver_has(
+    run: RunFolder, tmp_path: Path
+) -> None:
+    meshes = write_meshes(tmp_path / "driver" / "meshes")
+    there, here = (RunFolder(tmp_path / place / "tiny") for place in ("driver", "alone"))
+    for folder in (there, here):
+        shutil.copytree(run.shards("shards"), folder.shards("shards"))
+        shutil.copy(run.artifact("shards"), folder.path)
+        folder.config.write_text(run.config.read_text() + ONE_NETWORK)
+    for stage, module, given in ((OBJECTS, objects, meshes), (SWEEP, sweep, None)):
+        with opened(there, load_run_config(there.config).store, stage.name) as kept:
+            assert kept is not None
+            kept.put()
+            from_store = module.build(context_of(stage, there, kept, given))
+        alone = module.build(context_of(stage, here, None, given))
+        made = [folder.artifact(stage.name).read_bytes() for folder in (there, here)]
+        assert made[0] == made[1]
+        if stage is OBJECTS:
+            assert from_store == alone
+            assert from_store["objects"] == 3
+    held = ObjectStore(f"{URL}/tiny", 10.0).listed()
+    assert not [key for key in held if key.startswith(LENT)]  # nobody needs them any more
 
 
 @pytest.mark.usefixtures("in_store")

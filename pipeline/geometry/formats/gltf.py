@@ -85,6 +85,16 @@ def read(label: str, data: bytes, max_faces: int, beside: Beside) -> Surface:
         ) from error
 
 
+def files_named(label: str, data: bytes) -> tuple[str, ...]:
+    """The files that it keeps its data in, as it names them. Raises MeshError as `read` does."""
+    tree, _ = _chunks(label, data)
+    try:
+        uris = [str(buffer["uri"]) for buffer in tree.get("buffers", []) if "uri" in buffer]
+    except _DAMAGED as error:
+        raise MeshError(f"{label} has a damaged glTF description", EXPORT_AGAIN) from error
+    return tuple(uri for uri in uris if ":" not in uri)
+
+
 def _chunks(label: str, data: bytes) -> tuple[Any, bytes | None]:
     """The description, and a binary file's own buffer."""
     if data[:4] != _MAGIC:
