@@ -15,7 +15,7 @@ from pipeline.execution import StageContext, generator
 from pipeline.messages.evaluation import attempt_message
 from pipeline.messages.objects import catalogue
 from pipeline.messages.proposed_contacts import contacts_message
-from pipeline.messages.scenes import read_groups, read_scene, scene_places
+from pipeline.messages.scenes import read_scene, scene_places
 from pipeline.messages.trained import rates_for
 from pipeline.simulation.imperfection import with_imperfection
 from pipeline.simulation.picking import run_clutter
@@ -74,19 +74,31 @@ def clutter_jobs(
     ]
 
 
-def contacts_jobs(stage: StageContext) -> list[ContactsJob]:
-    """Some clutters a level of the evaluated and of the seen families, equally far apart."""
-    wanted, path = stage.config.evaluate, stage.upstream("scenes")
+def contacts_jobs(stage: StageContext, scenes: Sequence[ClutterScene]) -> list[ContactsJob]:
+    """Some clutters a level of the evaluated and of the seen families, equally far apart.
+
+    Parameters
+    ----------
+    stage
+        Stage evaluate.
+    scenes
+        All scenes of the run, in order.
+
+    Returns
+    -------
+    A job for each of the chosen clutters.
+    """
+    wanted = stage.config.evaluate
     by_group: dict[tuple[str, int], list[int]] = {}
-    for number, group in enumerate(read_groups(path)):
-        by_group.setdefault(group, []).append(number)
+    for number, scene in enumerate(scenes):
+        by_group.setdefault((scene.split, scene.level), []).append(number)
     chosen = [
         numbers[index]
         for (split, _), numbers in by_group.items()
         if split in (wanted.split, SEEN)
         for index in choose_evenly(len(numbers), wanted.precision.clutters_per_level)
     ]
-    folder, places = stage.folder.state("evaluate"), scene_places(path)
+    folder, places = stage.folder.state("evaluate"), scene_places(stage.upstream("scenes"))
     return [
         ContactsJob(
             scene=places[number],

@@ -3,7 +3,7 @@
 import os
 import shutil
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from google.protobuf.message import Message
 
@@ -31,7 +31,8 @@ from stages.graph import EVALUATE, RUNS_DIR, inputs_of
 
 def build(stage: StageContext) -> Summary:
     """Pick the clutters of a split empty in closed loop; success is judged by physics."""
-    scenes = clutters(stage)
+    every_scene = read_unseen_scenes(stage.upstream("scenes"))
+    scenes = clutters(stage, every_scene)
     wanted = stage.config.evaluate
     robot, accelerations = wanted.imperfection, wanted.transport.accelerations_m_s2
     some = curve_scenes(scenes, robot.curve_clutters)
@@ -39,7 +40,7 @@ def build(stage: StageContext) -> Summary:
     curve = {scale: clutter_jobs(stage, some, robot.curve_policies, scale) for scale in robot.curve}
     # A policy, a clutter and a scale that both ask for are one job.
     jobs = {job.path: job for part in (contest, *curve.values()) for job in part}
-    rated = contacts_jobs(stage)
+    rated = contacts_jobs(stage, every_scene)
     every: list[ClutterJob | ContactsJob] = [*jobs.values(), *rated]
     limit_s, store = stage.item_limit_s, stage.store
     done = run_in_order(work, every, stage.workers, stage.executor, limit_s=limit_s, store=store)
@@ -63,11 +64,28 @@ def build(stage: StageContext) -> Summary:
     return {**results.summary(), "imperfection": curve_figures(points), **proposed.summary()}
 
 
-def clutters(stage: StageContext) -> list[ClutterScene]:
-    """The clutters that [evaluate] names. Raises ArtifactError where there is none."""
+def clutters(stage: StageContext, every_scene: Sequence[ClutterScene]) -> list[ClutterScene]:
+    """The clutters that [evaluate] names.
+
+    Parameters
+    ----------
+    stage
+        Stage evaluate.
+    every_scene
+        All scenes of the run.
+
+    Returns
+    -------
+    Those of the evaluated split from the first wanted number on, in the same order.
+
+    Raises
+    ------
+    ArtifactError
+        There is none.
+    """
     split, first = stage.config.evaluate.split, stage.config.evaluate.clutters_from
-    every = [s for s in read_unseen_scenes(stage.upstream("scenes")) if s.split == split]
-    scenes = [s for s in every if clutter_number(s.scene_id) >= first]
+    of_split = [scene for scene in every_scene if scene.split == split]
+    scenes = [scene for scene in of_split if clutter_number(scene.scene_id) >= first]
     if not scenes:
         raise ArtifactError(
             f"{stage.upstream('scenes')} holds no {split} clutter from number {first} on",

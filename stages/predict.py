@@ -23,8 +23,9 @@ from pipeline.artifacts import (
     publish_bytes,
 )
 from pipeline.camera.frame_files import FrameFiles, read_frame, with_neighbours, within_workspace
+from pipeline.camera.frame_support import frames_that_agree
 from pipeline.camera.prediction import Prediction
-from pipeline.camera.proposals import frames_that_agree, propose_grasps
+from pipeline.camera.proposals import propose_grasps
 from pipeline.config import RunConfig, load_run_config, section_digest
 from pipeline.control.ranking import NetworkRanking
 from pipeline.execution import RunFolder, generator, run_command

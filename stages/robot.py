@@ -21,9 +21,10 @@ from pipeline.errors import CalibrationError
 from pipeline.execution import generator, run_command
 from pipeline.messages.evaluation import attempt_message
 from pipeline.network.sources import ANALYTIC, RELEASED, quality_source
+from pipeline.robot.arm import DrivenRobot
 from pipeline.robot.calibration import read_calibration
-from pipeline.robot.cell import DrivenEyes, DrivenRobot
 from pipeline.robot.driver import Driver
+from pipeline.robot.eyes import DrivenEyes
 from pipeline.robot.trying import JUDGE, try_once
 from stages.graph import RUNS_DIR
 from stages.predict import predict_config, provenance

@@ -15,8 +15,8 @@ from pipeline.execution.items import scene_key
 from pipeline.messages.objects import catalogue
 from pipeline.messages.scenes import read_record, read_scene, write_scene
 from pipeline.sensing.rendering import Renderer, new_renderer, render_views
-from pipeline.world.cameras import scene_cameras
 from pipeline.world.scene import ClutterScene
+from pipeline.world.scene_cameras import scene_cameras
 from schemas.softgrip.v1.grasps_pb2 import ShardEntry
 from schemas.softgrip.v1.scenes_pb2 import Scene
 from stages.clutters import SceneJob, settled_clutter

@@ -13,7 +13,8 @@ import numpy as np
 
 from pipeline.camera.bags import RecordedPicture
 from pipeline.camera.frame import Frame
-from pipeline.camera.proposals import Proposals, apart, clear_of_support, support_of
+from pipeline.camera.frame_support import support_of
+from pipeline.camera.proposals import Proposals, apart, clear_of_support
 from pipeline.camera.support import Support, stands_out
 from pipeline.config import RunConfig
 from pipeline.control.candidates import candidates_at

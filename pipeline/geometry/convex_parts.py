@@ -7,7 +7,6 @@ Tree Search", 2022.
 import hashlib
 import importlib.metadata
 import io
-import zipfile
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -17,7 +16,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import ConvexHull
 
-from pipeline.artifacts.publishing import publish_bytes
+from pipeline.artifacts.kept_bytes import kept_bytes
 from pipeline.config.objects import ConvexPartsConfig
 from pipeline.geometry.manifolds import from_manifold, to_manifold
 from pipeline.geometry.mesh import Mesh
@@ -53,12 +52,8 @@ def convex_parts(mesh: Mesh, config: ConvexPartsConfig, cache_dir: Path) -> tupl
     recomputed. Raises TooIntricateError as `decompose` does.
     """
     mesh = outer_surface(mesh)
-    entry = cache_dir / f"{cache_key(mesh, config)}.npz"
-    parts = _read(entry)
-    if parts is None:
-        parts = decompose(mesh, config)
-        _write(entry, parts)
-    return parts
+    entry = cache_dir / f"{cache_key(mesh, config)}.parts"
+    return _unpacked(kept_bytes(entry, lambda: _packed(decompose(mesh, config))))
 
 
 def decompose(mesh: Mesh, config: ConvexPartsConfig) -> tuple[Mesh, ...]:
@@ -254,27 +249,8 @@ def _support(points: Float[np.ndarray, "n 3"], directions: Float[np.ndarray, "k 
     return list(dict.fromkeys(np.argmax(directions @ points.T, axis=1).tolist()))
 
 
-def _read(entry: Path) -> tuple[Mesh, ...] | None:
-    """The parts of a cache entry; None where there is none or it is damaged."""
-    try:
-        with np.load(entry, allow_pickle=False) as arrays:
-            vertices, faces = arrays["vertices_m"], arrays["faces"]
-            vertex_ends, face_ends = arrays["vertex_ends"], arrays["face_ends"]
-        if len(vertex_ends) == 0 or vertex_ends[-1] != len(vertices) or len(faces) == 0:
-            return None
-        parts = tuple(
-            Mesh(part_vertices, part_faces)
-            for part_vertices, part_faces in zip(
-                np.split(vertices, vertex_ends[:-1]), np.split(faces, face_ends[:-1]), strict=True
-            )
-        )
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-        return None
-    return parts if all(part.faces.max() < len(part.vertices_m) for part in parts) else None
-
-
-def _write(entry: Path, parts: tuple[Mesh, ...]) -> None:
-    """Written whole or not at all; what a killed process leaves is cleared with the run's."""
+def _packed(parts: tuple[Mesh, ...]) -> bytes:
+    """Convex parts as the bytes of an .npz file."""
     data = io.BytesIO()
     np.savez_compressed(
         data,
@@ -283,4 +259,12 @@ def _write(entry: Path, parts: tuple[Mesh, ...]) -> None:
         vertex_ends=np.cumsum([len(part.vertices_m) for part in parts]),
         face_ends=np.cumsum([len(part.faces) for part in parts]),
     )
-    publish_bytes(entry, data.getvalue())
+    return data.getvalue()
+
+
+def _unpacked(data: bytes) -> tuple[Mesh, ...]:
+    """The parts that `_packed` wrote."""
+    with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+        vertices = np.split(arrays["vertices_m"], arrays["vertex_ends"][:-1])
+        faces = np.split(arrays["faces"], arrays["face_ends"][:-1])
+    return tuple(Mesh(*part) for part in zip(vertices, faces, strict=True))

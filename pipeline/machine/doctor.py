@@ -17,7 +17,7 @@ OLDEST_PYTHON = (3, 11)  # the oldest that pyproject.toml allows
 FREE_GIB_WANTED = 5  # environment, caches and a run of paper
 RENDER_TRIAL = """
 from pipeline.config import ScenesConfig, StaticCameraConfig
-from pipeline.world.cameras import static_cameras
+from pipeline.world.scene_cameras import static_cameras
 from pipeline.sensing.sapien_rendering import render_table
 
 seen = render_table(ScenesConfig(), static_cameras(StaticCameraConfig())[0])

@@ -185,13 +185,6 @@ def scene_of(record: scenes_pb2.Scene) -> ClutterScene:
     return _scene(record, ())
 
 
-def read_groups(path: Path) -> list[tuple[str, int]]:
-    """Split and level of every scene, in order, without their images."""
-    with open_artifact(path) as artifact:
-        scenes = artifact.messages(scenes_pb2.Scene, TOPIC)
-        return [(message.split, message.level) for _, message in scenes]
-
-
 def read_placed(path: Path, index: int) -> tuple[PlacedObject, ...]:
     """The objects of scene ``index`` where they lie, no image read."""
     with open_artifact(path) as artifact:

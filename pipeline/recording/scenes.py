@@ -22,8 +22,9 @@ from pipeline.recording.recording import (
 )
 from pipeline.recording.shapes import shown_mesh, shown_pose
 from pipeline.spread import choose_evenly
-from pipeline.world.cameras import camera_names, points_of_depth
+from pipeline.world.cameras import points_of_depth
 from pipeline.world.scene import ClutterScene
+from pipeline.world.scene_cameras import camera_names
 from pipeline.world.view import CameraView
 
 TIMELINE = "scene"

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from pipeline.config.referee import RefereeConfig
-from pipeline.referee import compiled, foundation
+from pipeline.referee import compiled_leak, compiled_press, foundation
 from pipeline.referee import leak as film
 from pipeline.referee.disc import Disc, build_disc
 from pipeline.referee.foundation import Cushion, Pressed
@@ -115,7 +115,7 @@ def seal(referee: Referee, surface: Surface, way: Way = "compiled") -> Seal:
         pressed = _pressed(referee, surface, force_n, pressed, way)
         gap = np.where(np.isfinite(surface.height_m), pressed.face_m - surface.height_m, np.inf)
         film_m = np.maximum(gap, 0.0) + referee.config.roughness_m
-        leak = film.leak if way == "plain" else compiled.leak
+        leak = film.leak if way == "plain" else compiled_leak.leak
         vacuum = leak(disc, film_m, surface.open_to_air, referee.face, referee.fan)
         wrench = suction_wrench(disc, vacuum.under_face_pa, surface.height_m, surface.on_target)
         if wrench[2] <= force_n * (1 + DRAWN_IN):
@@ -139,7 +139,7 @@ def _pressed(
     """The pad pressed with a force, either way; ``before`` with less."""
     if way == "plain":
         return foundation.press(referee.disc, referee.cushion, surface.height_m, force_n)
-    return compiled.press(referee.disc, referee.cushion, surface.height_m, force_n, before)
+    return compiled_press.press(referee.disc, referee.cushion, surface.height_m, force_n, before)
 
 
 def weight_borne_n(

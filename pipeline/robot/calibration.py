@@ -75,6 +75,12 @@ class Calibration:
         ):
             object.__setattr__(self, name, read_only(getattr(self, name)))
 
+    def world_from_gripper(
+        self, base_from_flange: Float[np.ndarray, "4 4"]
+    ) -> Float[np.ndarray, "4 4"]:
+        """Where the pad is in WCS, for the flange at a pose."""
+        return np.asarray(self.world_from_base @ base_from_flange @ self.flange_from_gripper)
+
     def pressure(self, vacuum_pa: float) -> float:
         """A reading of the sensor over that of a closed pad, in [0, 1]; NaN without a sensor."""
         span = self.vacuum_closed_pa - self.vacuum_open_pa

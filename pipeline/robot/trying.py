@@ -11,7 +11,7 @@ from pipeline.control.attempts import JudgedAttempt, LoggedEyes
 from pipeline.control.decision import Cause, Decision, Strategy, TriedContact
 from pipeline.control.policy import Attempt
 from pipeline.control.robot import Eyes
-from pipeline.robot.cell import DrivenRobot
+from pipeline.robot.arm import DrivenRobot
 
 JUDGE = "robot"  # what messages call this judge
 # Under this share of the seal's vacuum the pad draws air: what it held is gone.

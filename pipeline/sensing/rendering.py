@@ -2,7 +2,7 @@
 
 On one machine and driver equal scenes give equal bits. Between drivers the last bits of depth
 differ, and at silhouettes the body a pixel belongs to: so renderers are compared inside
-surfaces alone, on depth, segmentation and normals within bounds (tests/sensing/test_pictures).
+surfaces alone, on depth, segmentation and normals within bounds (tests/sensing/test_rendering).
 """
 
 from collections.abc import Mapping, Sequence

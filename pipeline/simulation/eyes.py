@@ -22,8 +22,9 @@ from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.transforms import invert, look_at
 from pipeline.sensing.depth_by_rays import measure_depth, window_around
 from pipeline.simulation.imperfection import Calibration
-from pipeline.world.cameras import PinholeCamera, camera_at, static_cameras
+from pipeline.world.cameras import PinholeCamera, camera_at
 from pipeline.world.posed_bodies import PosedBodies
+from pipeline.world.scene_cameras import static_cameras
 
 _ORIGIN = np.zeros(3)  # the wrist camera gets its pose at every picture
 _SECTIONS = 48  # sides of the gripper's outline in pictures: finer than a pixel

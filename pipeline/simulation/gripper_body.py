@@ -16,9 +16,9 @@ from jaxtyping import Float
 from pipeline.config import RunConfig
 from pipeline.control.attempts import Sample
 from pipeline.control.robot import Reading, State
-from pipeline.control.transport import there_and_back
+from pipeline.control.setpoints import ARRIVED_M, LAG_M, Way, next_speed_m_s
+from pipeline.control.transport import there_and_back, way_aside_m
 from pipeline.geometry.catalogue import CatalogueObject
-from pipeline.geometry.compiled_poses import turn_between, turned
 from pipeline.gripper.pad import Pad
 from pipeline.labelling.heights import pad_heights
 from pipeline.labelling.poses import label_poses
@@ -29,24 +29,11 @@ from pipeline.simulation.judges import build_judge
 from pipeline.simulation.payload import (
     GRAVITY_M_S2,
     loads_of_a_kilogram,
-    way_inwards,
     weight_borne_n,
 )
 from pipeline.simulation.suction_joint import SuctionJoint
+from pipeline.simulation.wrenches import at_flange, push_on
 from pipeline.world.posed_bodies import PosedBodies, PosedScene
-
-_ARRIVED_M, _ARRIVED_RAD = 1e-4, 1e-3  # a motion has ended: under what a camera tells apart
-_LAG_M = 0.002  # an arm that is this near has arrived
-_LEVER_M = 0.2  # a turn counts as the way of a point this far from the axis
-
-
-def pose_between(
-    first: Float[np.ndarray, "4 4"], second: Float[np.ndarray, "4 4"], share: float
-) -> Float[np.ndarray, "4 4"]:
-    """A pose at a share of the way from one pose to another: 0 is the first, 1 the second."""
-    pose = turned(first, share * turn_between(first, second))
-    pose[:3, 3] += share * (second[:3, 3] - first[:3, 3])
-    return np.asarray(pose)
 
 
 class SuctionGripper:
@@ -161,9 +148,14 @@ class SuctionGripper:
         a, b = self.samples[max(after - 1, 0)], self.samples[after]
         span_s = b.time_s - a.time_s
         share = min(max((self.time_s - age_s - a.time_s) / span_s, 0.0), 1.0) if span_s else 1.0
-        return pose_between(a.world_from_gripper, b.world_from_gripper, share), {
-            i: pose_between(a.world_from_object[i], b.world_from_object[i], share)
-            for i in self._bodies
+
+        def then(
+            first: Float[np.ndarray, "4 4"], second: Float[np.ndarray, "4 4"]
+        ) -> Float[np.ndarray, "4 4"]:
+            return Way.between(first, second).gone(first, share)
+
+        return then(a.world_from_gripper, b.world_from_gripper), {
+            i: then(a.world_from_object[i], b.world_from_object[i]) for i in self._bodies
         }
 
     def reachable(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> bool:
@@ -259,8 +251,9 @@ class SuctionGripper:
         The way is towards the table's middle, or wherever else the mover can go.
         """
         transport, dt = self._config.evaluate.transport, self._world.timestep
-        start, aside_m = self._goal.copy(), self._way_aside_m()
-        leg_s = 2 * math.sqrt(max(float(np.linalg.norm(aside_m)), _ARRIVED_M) / acceleration_m_s2)
+        start = self._goal.copy()
+        aside_m = way_aside_m(start, transport.way_m, self.reachable)
+        leg_s = 2 * math.sqrt(max(float(np.linalg.norm(aside_m)), ARRIVED_M) / acceleration_m_s2)
         moving, resting = math.ceil(2 * leg_s / dt), math.ceil(transport.rest_s / dt)
         loads = []
         for number in range(1, moving + resting + 1):
@@ -272,21 +265,6 @@ class SuctionGripper:
         return self._reading(
             np.mean(loads[-self._steps :], axis=0), np.zeros(3), True, touched=False
         )
-
-    def _way_aside_m(self) -> Float[np.ndarray, " 3"]:
-        """A level way that the mover can go, as long as the configuration's where possible."""
-        way_m = self._config.evaluate.transport.way_m
-        ways = [way_inwards(self._goal[:3, 3])]
-        ways += [
-            np.array([x, y, 0.0]) for x, y in ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
-        ]
-        for length_m in (way_m, way_m / 2, way_m / 4):
-            for way in ways:
-                end = self._goal.copy()
-                end[:3, 3] += length_m * way
-                if self.reachable(end):
-                    return np.asarray(length_m * way)
-        return np.zeros(3)
 
     def lifted_m(self) -> float:
         """Height of the held object above where it was sealed [m]; 0 where none is held."""
@@ -341,19 +319,14 @@ class SuctionGripper:
 
     def _advance(self, target: Float[np.ndarray, "4 4"], speed_m_s: float) -> None:
         """Move the commanded pose by one physics step, within speed and acceleration."""
-        way = target[:3, 3] - self._goal[:3, 3]
-        turn = turn_between(self._goal, target)
-        left = max(float(np.linalg.norm(way)), _LEVER_M * float(np.linalg.norm(turn)))
-        if left < 1e-9:
+        way = Way.between(self._goal, target)
+        left_m = way.length_m
+        if left_m < 1e-9:
             self._speed_m_s = 0.0
             return
         acceleration, dt = self._config.evaluate.policy.acceleration_m_s2, self._world.timestep
-        self._speed_m_s = min(
-            self._speed_m_s + acceleration * dt, speed_m_s, float(np.sqrt(2 * acceleration * left))
-        )
-        share = min(self._speed_m_s * dt / left, 1.0)
-        self._goal = turned(self._goal, share * turn)
-        self._goal[:3, 3] += share * way
+        self._speed_m_s = next_speed_m_s(self._speed_m_s, speed_m_s, left_m, acceleration, dt)
+        self._goal = way.gone(self._goal, min(self._speed_m_s * dt / left_m, 1.0))
 
     def _physics_step(self) -> tuple[Float[np.ndarray, " 6"], Float[np.ndarray, " 3"]]:
         """Step the world once; load on the pad, and force on the rigid parts [N], both in GCS."""
@@ -367,7 +340,7 @@ class SuctionGripper:
         self._convey()
         self._world.step()
         self.time_s += self._world.timestep
-        push = self._push_on_rigid_parts()
+        push = push_on(self._world, self._mover.owns, self.pose()[:3, 3])
         if push is None:
             return load, np.zeros(3)
         into_gripper = self.pose()[:3, :3].T
@@ -391,23 +364,6 @@ class SuctionGripper:
             if body is not held:
                 falling = float(body.rigid.linear_velocity[2])
                 body.rigid.set_linear_velocity([speed_m_s, 0.0, falling])
-
-    def _push_on_rigid_parts(self) -> Float[np.ndarray, " 6"] | None:
-        """Contact force [N], moment about the pad's centre [N m], in WCS; None without."""
-        total, centre = None, self.pose()[:3, 3]
-        owns = self._mover.owns
-        for contact in self._world.get_contacts():
-            one, other = contact.bodies
-            first = owns(one.entity)
-            if first == owns(other.entity):
-                continue
-            total = np.zeros(6) if total is None else total
-            sign = 1.0 if first else -1.0
-            for point in contact.points:
-                force = sign * np.asarray(point.impulse, dtype=np.float64) / self._world.timestep
-                total[:3] += force
-                total[3:] += np.cross(np.asarray(point.position) - centre, force)
-        return total
 
     def _reading(
         self,
@@ -435,22 +391,13 @@ class SuctionGripper:
         self, load: Float[np.ndarray, " 6"], error: Float[np.ndarray, " 6"] | None
     ) -> Float[np.ndarray, " 6"]:
         """The wrench at the flange that is read under a load at the pad's centre, shape (6,)."""
-        at_base = self._at_base(load)
-        return at_base if error is None else at_base + error
-
-    def _at_base(self, load: Float[np.ndarray, " 6"]) -> Float[np.ndarray, " 6"]:
-        """A load at the pad's centre, moved to the flange; axes stay those of GCS."""
-        pad_from_base = np.array([0.0, 0.0, -self._config.evaluate.hand.length_m])
-        return np.concatenate([load[:3], load[3:] + np.cross(pad_from_base, load[:3])])
+        felt = at_flange(load, self._config.evaluate.hand.length_m)
+        return felt if error is None else felt + error
 
     def _at(self, target: Float[np.ndarray, "4 4"]) -> bool:
         """Whether the target was commanded and the gripper has arrived there."""
         lag = float(np.linalg.norm(self._goal[:3, 3] - self.pose()[:3, 3]))
-        if lag > _LAG_M:
-            return False
-        way = float(np.linalg.norm(target[:3, 3] - self._goal[:3, 3]))
-        turn = float(np.linalg.norm(turn_between(self._goal, target)))
-        return way <= _ARRIVED_M and turn <= _ARRIVED_RAD
+        return lag <= LAG_M and Way.between(self._goal, target).is_done
 
     def _sample(self, wrench: Float[np.ndarray, " 6"]) -> None:
         """Append the present state to the recorded samples."""

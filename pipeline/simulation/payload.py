@@ -10,10 +10,10 @@ import numpy as np
 from jaxtyping import Float
 
 from pipeline.config.evaluation import EvaluateConfig
+from pipeline.control.transport import way_inwards
 from pipeline.simulation.judges import Bearing
 
 GRAVITY_M_S2 = 9.81  # standard gravity to three digits
-_AT_THE_MIDDLE_M = 1e-4  # nearer than this, no direction leads to the table's middle
 
 
 def loads_of_a_kilogram(
@@ -42,13 +42,6 @@ def loads_of_a_kilogram(
     force = -(accelerations_m_s2 + upwards) @ into_gripper.T
     arm_m = into_gripper @ (centre_of_mass_m - world_from_gripper[:3, 3])
     return np.column_stack([force, np.cross(arm_m, force)])
-
-
-def way_inwards(place_m: Float[np.ndarray, " 3"]) -> Float[np.ndarray, " 3"]:
-    """Level unit vector from a place in WCS [m] to the table's middle; x where it is there."""
-    inwards = -place_m * [1.0, 1.0, 0.0]
-    far_m = float(np.linalg.norm(inwards))
-    return inwards / far_m if far_m > _AT_THE_MIDDLE_M else np.array([1.0, 0.0, 0.0])
 
 
 def accelerations_m_s2(

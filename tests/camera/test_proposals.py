@@ -10,11 +10,11 @@ from hypothesis import strategies as st
 
 from pipeline.camera.frame import Frame
 from pipeline.camera.frame_files import FrameFiles, read_frame
+from pipeline.camera.frame_support import frames_that_agree
 from pipeline.camera.proposals import (
     Proposals,
     apart,
     clear_of_support,
-    frames_that_agree,
     pixels_of,
     propose_grasps,
 )

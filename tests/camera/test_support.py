@@ -4,13 +4,8 @@ import numpy as np
 import pytest
 
 from pipeline.camera.frame import Frame
-from pipeline.camera.support import (
-    UP_IN_CAMERA,
-    Support,
-    find_support,
-    inside,
-    stands_out,
-)
+from pipeline.camera.support import Support, inside, stands_out
+from pipeline.camera.support_search import UP_IN_CAMERA, find_support
 from pipeline.config import RunConfig
 from pipeline.errors import PictureError
 from pipeline.geometry.transforms import invert, look_at, transform_points

@@ -13,7 +13,7 @@ from pipeline.control.cloud import Cloud, merged_cloud
 from pipeline.control.ranking import GeometricRanking, smooth_quality
 from pipeline.labelling.sampling import contact_frames
 from tests.control.fakes import picture_of
-from tests.control.test_policy import plate
+from tests.control.plates import plate
 
 CONFIG = EvaluateConfig()
 EYE = np.array([0.0, 0.0, 0.9])

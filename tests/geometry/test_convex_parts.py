@@ -82,7 +82,7 @@ def test_parts_of_a_cross_are_bars_and_cover_it(cross_parts: tuple[Mesh, ...]) -
 def test_parts_are_kept_and_a_damaged_entry_is_made_again(tmp_path: Path) -> None:
     mesh = cross()
     first = convex_parts(mesh, CONFIG, tmp_path)
-    (entry,) = tmp_path.glob("*.npz")
+    (entry,) = tmp_path.glob("*.parts")
     assert entry.stem == cache_key(mesh, CONFIG)
     kept = convex_parts(mesh, CONFIG, tmp_path)
     assert [p.vertices_m.tobytes() for p in kept] == [p.vertices_m.tobytes() for p in first]

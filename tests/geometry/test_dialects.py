@@ -15,8 +15,12 @@ from pipeline.config import ObjectsConfig
 from pipeline.geometry.catalogue import measure_object
 from pipeline.geometry.mesh_files import load_mesh_file
 from pipeline.geometry.shape import surface_area, volume
-from tests.geometry.corpus.dialects import Gltf, Obj, Off, Ply, Stl, gltf, obj, off, ply, stl
+from tests.geometry.corpus.gltf_dialects import Gltf, gltf
+from tests.geometry.corpus.obj_dialects import Obj, obj
+from tests.geometry.corpus.off_dialects import Off, off
+from tests.geometry.corpus.ply_dialects import Ply, ply
 from tests.geometry.corpus.solids import Solid, corners_of_triangles, prism
+from tests.geometry.corpus.stl_dialects import Stl, stl
 
 CONFIG = ObjectsConfig(rescaled=False)
 TOLERANCE = 1e-6

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from pipeline.referee import compiled, foundation
+from pipeline.referee import compiled_press, foundation
 from pipeline.referee.disc import build_disc, laplacian
 from pipeline.referee.foundation import Cushion
 from tests.referee.shapes import referee, rough
 
 SOFT = Cushion(stiffness_pa_m=2e6, tension_n_m=0.0)
-WAYS = [foundation.press, compiled.press]
+WAYS = [foundation.press, compiled_press.press]
 
 
 @pytest.mark.parametrize("press", WAYS)
@@ -65,11 +65,11 @@ def test_the_pad_obeys_the_variational_inequality_either_way(seed: int) -> None:
     springs = pad.cushion.stiffness_pa_m * pad.disc.areas_m2
     rest = skin @ plain.face_m + springs * (plain.face_m - plain.back_m) - plain.contact_n
     assert np.abs(rest).max() < 1e-9 * force_n
-    quick = compiled.press(pad.disc, pad.cushion, surface, force_n)
+    quick = compiled_press.press(pad.disc, pad.cushion, surface, force_n)
     np.testing.assert_allclose(quick.face_m, plain.face_m, atol=1e-7)
     np.testing.assert_allclose(quick.contact_n, plain.contact_n, atol=1e-4 * force_n)
-    less = compiled.press(pad.disc, pad.cushion, surface, 0.7 * force_n)
-    warm = compiled.press(pad.disc, pad.cushion, surface, force_n, less)
+    less = compiled_press.press(pad.disc, pad.cushion, surface, 0.7 * force_n)
+    warm = compiled_press.press(pad.disc, pad.cushion, surface, force_n, less)
     np.testing.assert_allclose(warm.face_m, plain.face_m, atol=1e-7)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.referee import compiled, leak
+from pipeline.referee import compiled_leak, leak
 from pipeline.referee.disc import build_disc
 from pipeline.referee.leak import AIR_DENSITY_KG_M3, AIR_VISCOSITY_PA_S, Face, film_mobility
 from pipeline.referee.pump import Fan, working_point
@@ -11,7 +11,7 @@ from tests.referee.shapes import referee, rough
 
 DISC = build_disc(0.025, 0.025 / 32)
 EVERYWHERE = np.ones(len(DISC.areas_m2), dtype=bool)
-WAYS = [leak.leak, compiled.leak]
+WAYS = [leak.leak, compiled_leak.leak]
 
 
 def test_an_annular_gap_leaks_as_poiseuille_says() -> None:
@@ -92,7 +92,7 @@ def test_compiled_and_plain_agree_and_air_is_conserved(seed: int) -> None:
     gap = np.where(np.isfinite(surface.height_m), -surface.height_m, 1.0)
     film = 2e-5 + np.maximum(gap - np.quantile(gap, 0.5), 0.0)
     plain = leak.leak(pad.disc, film, surface.open_to_air, pad.face, pad.fan)
-    quick = compiled.leak(pad.disc, film, surface.open_to_air, pad.face, pad.fan)
+    quick = compiled_leak.leak(pad.disc, film, surface.open_to_air, pad.face, pad.fan)
     np.testing.assert_allclose(quick.under_face_pa, plain.under_face_pa, atol=0.5)
     assert quick.in_cushion_pa == pytest.approx(plain.in_cushion_pa, rel=1e-5)
     drop = plain.in_cushion_pa - plain.under_face_pa

@@ -17,8 +17,9 @@ from pipeline.config import RunConfig
 from pipeline.control.viewpoints import gripper_above
 from pipeline.errors import CalibrationError
 from pipeline.interchange.episodes import read_episodes
+from pipeline.robot.arm import DrivenRobot
 from pipeline.robot.calibration import read_calibration
-from pipeline.robot.cell import DrivenEyes, DrivenRobot, in_range
+from pipeline.robot.eyes import DrivenEyes, in_range
 from pipeline.world.cameras import points_of_depth
 from schemas.softgrip.v1.evaluation_pb2 import Attempt
 from stages.robot import next_number, opened_driver, robot

@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.config.evaluation import EvaluateConfig, LiftConfig, TransportConfig
+from pipeline.control.transport import way_inwards
 from pipeline.simulation.payload import (
     GRAVITY_M_S2,
     accelerations_m_s2,
     loads_of_a_kilogram,
-    way_inwards,
     weight_borne_n,
 )
 from pipeline.simulation.suction import SealLimits

@@ -1,13 +1,13 @@
 """Which clutters are picked, what rates grasps for each policy, and what contacts come to."""
 
 import json
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
 from pipeline.artifacts import from_tensor, open_artifact
-from pipeline.config import load_run_config
+from pipeline.config import RunConfig, load_run_config
 from pipeline.config.evaluation import PolicyName
 from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder
@@ -19,6 +19,8 @@ from pipeline.messages.objects import read_objects
 from pipeline.messages.samples import read_split
 from pipeline.messages.scenes import read_scenes, read_unseen_scenes
 from pipeline.messages.trained import rates_for
+from pipeline.network.analytic import AnalyticBaseline
+from pipeline.network.samples import Samples
 from pipeline.network.sources import baseline_from_json
 from pipeline.simulation.proposed_contacts import propose_contacts
 from schemas.softgrip.v1.evaluation_pb2 import Attempt, ProposedContacts
@@ -31,7 +33,7 @@ def test_clutters_are_of_the_split_that_is_asked_for(run: RunFolder, split: str)
     context = stage_context(EVALUATE, run, inputs_of, None, workers=1)
     wanted = context.config.evaluate.model_copy(update={"split": split})
     config = context.config.model_copy(update={"evaluate": wanted})
-    found = clutters(replace(context, config=config))
+    found = clutters(replace(context, config=config), read_unseen_scenes(run.artifact("scenes")))
     assert [scene.split for scene in found] == [split]
 
 
@@ -40,40 +42,60 @@ def test_the_first_clutters_of_a_level_may_be_left_out(run: RunFolder) -> None:
     wanted = context.config.evaluate.model_copy(update={"clutters_from": 1})
     config = context.config.model_copy(update={"evaluate": wanted})
     with pytest.raises(ArtifactError, match=r"no test clutter from number 1 on.*at least 2"):
-        clutters(replace(context, config=config))
+        clutters(replace(context, config=config), read_unseen_scenes(run.artifact("scenes")))
 
 
-def test_the_analytic_policy_asks_the_baseline_that_was_fitted_to_the_train_split(
-    run: RunFolder,
-) -> None:
-    context = stage_context(EVALUATE, run, inputs_of, None, workers=1)
-    gripper = context.config.gripper
+@dataclass(frozen=True)
+class Rating:
+    """What rates grasps in a run: some samples, and the baseline fitted to its train split."""
+
+    run: RunFolder
+    config: RunConfig
+    samples: Samples
+    fitted: AnalyticBaseline
+
+    def by(self, policy: PolicyName, config: RunConfig) -> np.ndarray:
+        """The samples as a policy of the run rates them."""
+        rate = rates_for(policy, self.run.artifact("train"), config)
+        return rate(self.samples.cloud, self.samples.cloud_mask)
+
+    def expected(self) -> np.ndarray:
+        return self.fitted.predict(self.samples.cloud, self.samples.cloud_mask)
+
+
+@pytest.fixture(scope="module")
+def rating(run: RunFolder) -> Rating:
+    config = stage_context(EVALUATE, run, inputs_of, None, workers=1).config
     samples = read_split(run.artifact("shards"), "test").take(slice(0, 8))
-    fitted = baseline_from_json((run.path / "train" / "analytic.json").read_text(), gripper)
-    policies: tuple[tuple[PolicyName, bool], ...] = (
-        ("analytic", True),
-        ("closed-loop", False),
-        ("open-loop", False),
-        ("network", False),
-    )
-    for name, same in policies:
-        score = rates_for(name, run.artifact("train"), context.config)
-        found = score(samples.cloud, samples.cloud_mask)
-        expected = fitted.predict(samples.cloud, samples.cloud_mask)
-        assert np.array_equal(found, expected) is same, name
-    policy = context.config.evaluate.policy.model_copy(update={"analytic_share": 0.5})
-    both = context.config.evaluate.model_copy(update={"policy": policy})
-    joined = context.config.model_copy(update={"evaluate": both})
-    closed, network, analytic = (
-        rates_for(rated_by, run.artifact("train"), joined)(samples.cloud, samples.cloud_mask)
-        for rated_by in ("closed-loop", "network", "analytic")
-    )
-    assert np.array_equal(network, found)
-    assert np.array_equal(analytic, expected)
-    assert closed == pytest.approx((network + analytic) / 2)
-    # Beside a given network there is no training: the released baseline stands in.
-    beside = rates_for("analytic", run.path / GIVEN_NETWORK, context.config)
-    assert not np.array_equal(beside(samples.cloud, samples.cloud_mask), expected)
+    text = (run.path / "train" / "analytic.json").read_text()
+    return Rating(run, config, samples, baseline_from_json(text, config.gripper))
+
+
+@pytest.mark.parametrize(
+    ("policy", "same"),
+    [("analytic", True), ("closed-loop", False), ("open-loop", False), ("network", False)],
+)
+def test_the_analytic_policy_alone_asks_the_baseline_fitted_to_the_train_split(
+    rating: Rating, policy: PolicyName, same: bool
+) -> None:
+    assert np.array_equal(rating.by(policy, rating.config), rating.expected()) is same
+
+
+def test_the_baseline_may_share_in_the_rating_of_the_closed_loop(rating: Rating) -> None:
+    policy = rating.config.evaluate.policy.model_copy(update={"analytic_share": 0.5})
+    both = rating.config.evaluate.model_copy(update={"policy": policy})
+    joined = rating.config.model_copy(update={"evaluate": both})
+    network, analytic = rating.by("network", joined), rating.by("analytic", joined)
+    assert np.array_equal(network, rating.by("network", rating.config))
+    assert np.array_equal(analytic, rating.expected())
+    assert rating.by("closed-loop", joined) == pytest.approx((network + analytic) / 2)
+
+
+def test_beside_a_given_network_the_released_baseline_stands_in(rating: Rating) -> None:
+    """There is no training to fit one to."""
+    rate = rates_for("analytic", rating.run.path / GIVEN_NETWORK, rating.config)
+    found = rate(rating.samples.cloud, rating.samples.cloud_mask)
+    assert not np.array_equal(found, rating.expected())
 
 
 @pytest.fixture(scope="module")

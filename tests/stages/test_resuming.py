@@ -55,7 +55,7 @@ def test_killed_in_every_stage_and_started_elsewhere_it_ends_with_the_same_bytes
     folder.path.mkdir(parents=True)
     folder.config.write_text(TINY)
     with_convex_parts(run, tmp_path)
-    for path in sorted((tmp_path / run.cache.name).rglob("*.npz"))[::CUT_AGAIN]:
+    for path in sorted((tmp_path / run.cache.name).rglob("*.parts"))[::CUT_AGAIN]:
         path.unlink()
     killed = 0
     for number, stage in enumerate(STAGES):

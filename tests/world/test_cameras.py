@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.config.cameras import WristCameraConfig
-from pipeline.geometry.transforms import look_at, transform_points
+from pipeline.config.cameras import StaticCameraConfig, WristCameraConfig
+from pipeline.geometry.transforms import invert, look_at, transform_points
 from pipeline.world.cameras import (
     PinholeCamera,
     camera_at,
@@ -18,8 +18,10 @@ from pipeline.world.cameras import (
     points_of_depth,
     project,
     project_local,
+    shown_whole,
     thinned,
 )
+from pipeline.world.scene_cameras import static_cameras
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -113,3 +115,23 @@ def test_pose_and_intrinsics_cannot_be_written_to() -> None:
     for array in (camera.intrinsics, camera.world_from_camera):
         with pytest.raises(ValueError, match="read-only"):
             array[0, 0] = 2.0
+
+
+def test_shown_whole_is_a_ball_whose_every_point_is_in_the_picture() -> None:
+    """Against the picture's own projection of points all over each ball."""
+    rng = np.random.default_rng(3)
+    centres, radius = rng.uniform(-0.7, 0.7, (400, 3)) * [1, 1, 0.2], 0.04
+    shell = rng.normal(size=(3000, 3))
+    shell *= radius / np.linalg.norm(shell, axis=1, keepdims=True)
+    (camera,) = static_cameras(StaticCameraConfig())
+    world = centres[:, None] + shell
+    local = transform_points(invert(camera.world_from_camera), world.reshape(-1, 3))
+    pixels = local @ camera.intrinsics.T
+    column, row = (pixels[:, i] / pixels[:, 2] for i in (0, 1))
+    inside = (column >= 0) & (column <= camera.width_px) & (row >= 0) & (row <= camera.height_px)
+    whole = inside.reshape(len(centres), -1).all(axis=1)
+    found = shown_whole(camera, centres, radius)
+    assert 0.1 < whole.mean() < 0.9
+    assert not (found & ~whole).any()
+    # 3000 points do not touch a face that cuts less than a hair off the ball.
+    assert (shown_whole(camera, centres, 0.97 * radius) >= whole).all()

@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 
 from pipeline.gripper.compiled import compiled_finite
 from pipeline.gripper.solvers.interior_point import CORNER, RESIDUAL_TOLERANCE, SOLVED
-from pipeline.gripper.solvers.sifting import SIFTED, UNDECIDED
+from pipeline.gripper.solvers.newton import SIFTED, UNDECIDED
 
 
 @compiled_finite

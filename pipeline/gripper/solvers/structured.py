@@ -28,7 +28,8 @@ from jaxtyping import Float, Int
 from pipeline.gripper.problem import GraspStatus, QpSolution, QualityProblem
 from pipeline.gripper.solvers import interior_point
 from pipeline.gripper.solvers.certificate import certify_into
-from pipeline.gripper.solvers.sifting import ROOM, SIFTED, UNDECIDED, sift_into
+from pipeline.gripper.solvers.newton import ROOM, SIFTED, UNDECIDED
+from pipeline.gripper.solvers.sifting import sift_into
 
 
 def solve(problem: QualityProblem) -> QpSolution:

@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from tests.geometry.corpus.case import Case
-from tests.geometry.corpus.dialects import Ply, ply, stl
+from tests.geometry.corpus.ply_dialects import Ply, ply
 from tests.geometry.corpus.solids import Solid, box, in_triangles, prism, together
+from tests.geometry.corpus.stl_dialects import stl
 
 CUBE = box(0.1, 0.1, 0.1)
 HOLLOW = box(0.05, 0.05, 0.05).moved((0.045, 0.025, 0.025))

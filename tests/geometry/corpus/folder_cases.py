@@ -15,8 +15,10 @@ from pipeline.geometry.mesh_folders import list_mesh_files
 from pipeline.geometry.plan import Plan, plan_catalogue
 from pipeline.geometry.settled import Settled
 from pipeline.geometry.urdf_files import load_object_file, standalone
-from tests.geometry.corpus.dialects import obj, ply, stl
+from tests.geometry.corpus.obj_dialects import obj
+from tests.geometry.corpus.ply_dialects import ply
 from tests.geometry.corpus.solids import BOX, NOTCHED, Solid, box, in_triangles
+from tests.geometry.corpus.stl_dialects import stl
 
 # About a slanted axis, by a third of a turn and a bit; no corner stays on an axis.
 _ANGLE, _AXIS = 2.2, np.array([1.0, 2.0, 2.0]) / 3

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from tests.geometry.corpus.case import Case
-from tests.geometry.corpus.dialects import Gltf, GltfWriter, glb, gltf
+from tests.geometry.corpus.gltf_dialects import Gltf, GltfWriter, glb, gltf
 from tests.geometry.corpus.solids import BOX, TRIANGLES, Solid, box, in_triangles
 
 _DIALECTS = {

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from tests.geometry.corpus.case import Case
-from tests.geometry.corpus.dialects import Obj, obj
+from tests.geometry.corpus.obj_dialects import Obj, obj
 from tests.geometry.corpus.solids import BOX, NOTCHED, TRIANGLES, Solid, box
 
 _DIALECTS = {

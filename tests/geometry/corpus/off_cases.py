@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from tests.geometry.corpus.case import Case
-from tests.geometry.corpus.dialects import Off, off
+from tests.geometry.corpus.off_dialects import Off, off
 from tests.geometry.corpus.solids import BOX, NOTCHED, TRIANGLES
 
 _DIALECTS = {

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from tests.geometry.corpus.case import Case
-from tests.geometry.corpus.dialects import Ply, ply
+from tests.geometry.corpus.ply_dialects import Ply, ply
 from tests.geometry.corpus.solids import BOX, NOTCHED, TRIANGLES
 
 _TEXT = Ply(form="ascii")

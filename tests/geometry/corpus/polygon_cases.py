@@ -6,7 +6,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from tests.geometry.corpus.case import Case
-from tests.geometry.corpus.dialects import Off, Ply, obj, off, ply
+from tests.geometry.corpus.obj_dialects import obj
+from tests.geometry.corpus.off_dialects import Off, off
+from tests.geometry.corpus.ply_dialects import Ply, ply
 from tests.geometry.corpus.solids import BOX, NOTCHED_OUTLINE, Outline, Solid, prism, shoelace
 
 

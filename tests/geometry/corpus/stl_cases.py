@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from tests.geometry.corpus.case import Case
-from tests.geometry.corpus.dialects import Stl, stl, stl_binary, stl_text
 from tests.geometry.corpus.solids import BOX, TRIANGLES, box, corners_of_triangles, in_triangles
+from tests.geometry.corpus.stl_dialects import Stl, stl, stl_binary, stl_text
 
 _CORNERS = corners_of_triangles(TRIANGLES)
 _DIALECTS = {

@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 from tests.geometry.corpus.case import Case
-from tests.geometry.corpus.dialects import stl
 from tests.geometry.corpus.solids import BOX, TRIANGLES, box
+from tests.geometry.corpus.stl_dialects import stl
 
 MESH = {"meshes/my part.stl": stl(TRIANGLES)}
 _WORLD = (

@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 
 from pipeline.gripper import GraspStatus, QpSolution, QualityProblem
 from pipeline.gripper.quality import quality_of
-from pipeline.gripper.solvers import certificate, interior_point, sifting, structured
+from pipeline.gripper.solvers import certificate, interior_point, newton, sifting, structured
 from tests.gripper.solvers.test_solvers import PAD, from_heights, made_up
 
 
@@ -39,7 +39,7 @@ def setting(
 
 def sifted(problems: list[QualityProblem]) -> Sifted:
     counts = np.array([problem.wrench_matrix.shape[1] for problem in problems])
-    batch, most, room = len(problems), int(counts.max()), sifting.ROOM
+    batch, most, room = len(problems), int(counts.max()), newton.ROOM
     made = Sifted(
         np.zeros((batch, 4, most)),
         counts,
@@ -103,10 +103,10 @@ def by_interior_point(problem: QualityProblem) -> tuple[GraspStatus, float]:
 def test_pads_are_decided_in_each_way(pads: list[QualityProblem]) -> None:
     """At once where the best wrench is reached, by a certificate, or with few triangles left."""
     made = sifted(pads)
-    assert set(made.status) >= {interior_point.SOLVED, sifting.SIFTED}
+    assert set(made.status) >= {interior_point.SOLVED, newton.SIFTED}
     assert made.status[0] == interior_point.SOLVED  # the plane
-    few = made.status == sifting.SIFTED
-    assert (made.left[few] <= sifting.ROOM).all()
+    few = made.status == newton.SIFTED
+    assert (made.left[few] <= newton.ROOM).all()
     assert (made.left[few] < 0.5 * made.counts[few]).all()
 
 
@@ -129,7 +129,7 @@ def test_infeasible_problems_that_sifting_names_are_infeasible() -> None:
 def test_triangles_at_the_wrong_bound_are_not_certified(pads: list[QualityProblem]) -> None:
     """The same few triangles' answer is refused where multipliers ask for the other bound."""
     made = sifted(pads)
-    found, multipliers = np.zeros((len(pads), sifting.ROOM)), np.empty((len(pads), 5))
+    found, multipliers = np.zeros((len(pads), newton.ROOM)), np.empty((len(pads), 5))
     verdict, steps = np.zeros((2, len(pads)), dtype=np.int64)
     interior_point.solve_into(
         made.rows,
@@ -140,7 +140,7 @@ def test_triangles_at_the_wrong_bound_are_not_certified(pads: list[QualityProble
         made.forces,
         *setting(pads[0]),
         100,
-        made.status == sifting.SIFTED,
+        made.status == newton.SIFTED,
         found,
         multipliers,
         verdict,
@@ -165,7 +165,7 @@ def test_triangles_at_the_wrong_bound_are_not_certified(pads: list[QualityProble
             status,
             made.iterations.copy(),
         )
-        certified = status[made.status == sifting.SIFTED] == interior_point.SOLVED
+        certified = status[made.status == newton.SIFTED] == interior_point.SOLVED
         assert certified.mean() > 0.7 if sign > 0 else not certified.any()
 
 

@@ -1,129 +1,29 @@
-"""A driver and its calibration as the policy's `Eyes` and `Robot`.
+"""A driver's arm and vacuum, with their calibration, as the policy's `Robot`.
 
 Between two control steps of the policy the arm follows setpoints at the driver's own period, and
 stops within one of them where the pad touches: at 0.25 m/s and 8 ms that is 2 mm.
 """
 
 import math
-from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
 
 from pipeline.config import RunConfig
 from pipeline.control.attempts import Sample
-from pipeline.control.cloud import DepthPicture
 from pipeline.control.robot import Reading, State
-from pipeline.control.transport import there_and_back
+from pipeline.control.setpoints import ARRIVED_M, LAG_M, Way, next_speed_m_s
+from pipeline.control.transport import there_and_back, way_aside_m
 from pipeline.errors import CalibrationError
-from pipeline.geometry.compiled_poses import turn_between, turned
-from pipeline.geometry.transforms import invert, transform_points
+from pipeline.geometry.transforms import invert
 from pipeline.robot.calibration import Calibration
 from pipeline.robot.driver import Driver
-from pipeline.sensing.depth_by_rays import window_around
-from pipeline.world.cameras import PinholeCamera, points_of_depth
 
 GRAVITY_M_S2 = 9.81  # standard gravity to three digits
 TARE_READINGS = 50  # of which the mean is the wrench's bias, and the spread its noise
 SIGMAS = 3.0  # a threshold this many standard deviations over noise is rarely passed by chance
-# The arm has arrived where it lags by less; where it lags by more than _LOST_M it does not follow.
-_ARRIVED_M, _ARRIVED_RAD, _LAG_M, _LOST_M = 1e-4, 1e-3, 0.002, 0.03
+_LOST_M = 0.03  # an arm that lags by more does not follow
 _SETTLE_S = 1.0  # an arm that has not come to rest at its last setpoint by then does not follow
-_AT_HOME_M = 0.01  # the arm is out of sight where the pad is this near to home
-_LEVER_M = 0.2  # a turn counts as the way of a point this far from the axis
-
-
-class DrivenEyes:
-    """The cell's cameras as `pipeline.control.robot.Eyes`; the gripper itself is cut out."""
-
-    def __init__(self, driver: Driver, calibration: Calibration, config: RunConfig) -> None:
-        """Take no picture yet.
-
-        Parameters
-        ----------
-        driver
-            Takes the pictures.
-        calibration
-            The cameras.
-        config
-            Size of pad and hand, which are cut out of the wrist's picture.
-        """
-        self._driver = driver
-        self._calibration = calibration
-        self._config = config
-        self._from_home: list[DepthPicture] = []
-
-    def static(self) -> list[DepthPicture] | None:
-        """One picture of every camera beside the table, the arm out of their sight.
-
-        Away from home the arm would be seen as something to grip, so the last pictures that were
-        taken with the arm at home are given again.
-        """
-        here = world_from_gripper(self._driver, self._calibration)
-        away_m = np.linalg.norm(here[:3, 3] - self._calibration.home[:3, 3])
-        if away_m > _AT_HOME_M and self._from_home:
-            return self._from_home
-        depths = self._driver.static_depths_m()
-        if depths is None:
-            return None
-        cameras = self._calibration.static
-        if len(depths) != len(cameras):
-            raise CalibrationError(
-                f"the driver gives {len(depths)} static pictures, and {len(cameras)} cameras are "
-                "calibrated",
-                "Give one of each camera, in the order of static_cameras",
-            )
-        self._from_home = [
-            DepthPicture(in_range(depth, camera), camera)
-            for depth, camera in zip(depths, cameras, strict=True)
-        ]
-        return self._from_home
-
-    def wrist_camera(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> PinholeCamera:
-        """The wrist's camera as it is calibrated, for the gripper at a pose."""
-        held = self._calibration
-        world_from_flange = world_from_gripper @ invert(held.flange_from_gripper)
-        return replace(held.wrist, world_from_camera=world_from_flange @ held.flange_from_camera)
-
-    def wrist(self, around_m: Float[np.ndarray, " 3"], radius_m: float) -> DepthPicture | None:
-        """The part of the wrist camera's picture that shows a ball in WCS.
-
-        Parameters
-        ----------
-        around_m
-            Its centre [m], shape (3,).
-        radius_m
-            Its radius [m].
-
-        Returns
-        -------
-        The picture, with a camera that describes this part only; None where the camera stopped.
-        """
-        depth_m = self._driver.wrist_depth_m()
-        if depth_m is None:
-            return None
-        pose = world_from_gripper(self._driver, self._calibration)
-        whole = self.wrist_camera(pose)
-        part = window_around(whole, around_m, radius_m)
-        left, top = np.round(whole.intrinsics[:2, 2] - part.intrinsics[:2, 2]).astype(int)
-        shown = in_range(depth_m, whole)[top : top + part.height_px, left : left + part.width_px]
-        return DepthPicture(self._without_gripper(shown, part, pose), part)
-
-    def _without_gripper(
-        self,
-        depth_m: Float[np.ndarray, "h w"],
-        camera: PinholeCamera,
-        pose: Float[np.ndarray, "4 4"],
-    ) -> Float[np.ndarray, "h w"]:
-        """The picture without what lies where pad and hand are: a cylinder behind the pad."""
-        points, rows, columns = points_of_depth(depth_m, camera, every=1)
-        own = transform_points(invert(pose), points)
-        hand = self._config.evaluate.hand
-        radius_m = self._config.gripper.pad.radius_m + hand.margin_m
-        inside = (np.hypot(own[:, 0], own[:, 1]) < radius_m) & (own[:, 2] > hand.margin_m)
-        kept = depth_m.copy()
-        kept[rows[inside], columns[inside]] = 0.0
-        return kept
 
 
 class DrivenRobot:
@@ -187,7 +87,7 @@ class DrivenRobot:
 
     def pose(self) -> Float[np.ndarray, "4 4"]:
         """Measured world_from_gripper."""
-        return world_from_gripper(self._driver, self._calibration)
+        return self._calibration.world_from_gripper(self._driver.base_from_flange())
 
     def reachable(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> bool:
         """Whether the arm can take the pose."""
@@ -241,8 +141,9 @@ class DrivenRobot:
     def carry(self, acceleration_m_s2: float) -> Reading:
         """Aside and back at an acceleration, then stop; the wrench is the mean at rest."""
         transport, dt = self._config.evaluate.transport, self._driver.period_s
-        start, aside_m = self._goal.copy(), self._way_aside_m()
-        leg_s = 2 * math.sqrt(max(float(np.linalg.norm(aside_m)), _ARRIVED_M) / acceleration_m_s2)
+        start = self._goal.copy()
+        aside_m = way_aside_m(start, transport.way_m, self.reachable)
+        leg_s = 2 * math.sqrt(max(float(np.linalg.norm(aside_m)), ARRIVED_M) / acceleration_m_s2)
         for number in range(1, math.ceil(2 * leg_s / dt) + 1):
             goal = start.copy()
             goal[:3, 3] += there_and_back(number * dt / leg_s) * aside_m
@@ -263,21 +164,6 @@ class DrivenRobot:
             felt.append(self._wrench())
         return self._reading(np.mean(felt[-self._steps :], axis=0), 0.0, True, followed=True)
 
-    def _way_aside_m(self) -> Float[np.ndarray, " 3"]:
-        """A level way towards the table's middle, or another that the arm can go."""
-        way_m, place = self._config.evaluate.transport.way_m, self._goal[:3, 3]
-        inwards = -place * [1.0, 1.0, 0.0]
-        far_m = float(np.linalg.norm(inwards))
-        ways = [inwards / far_m] if far_m > _ARRIVED_M else []
-        ways += [np.array([x, y, 0.0]) for x, y in ((1, 0), (0, 1), (-1, 0), (0, -1))]
-        for length_m in (way_m, way_m / 2, way_m / 4):
-            for way in ways:
-                end = self._goal.copy()
-                end[:3, 3] += length_m * way
-                if self.reachable(end):
-                    return np.asarray(length_m * way)
-        return np.zeros(3)
-
     def _go(self, pose: Float[np.ndarray, "4 4"]) -> None:
         """Travel to a pose, and refuse to go on where the arm does not get there."""
         while not self._at(pose):
@@ -291,20 +177,16 @@ class DrivenRobot:
 
     def _advance(self, target: Float[np.ndarray, "4 4"], speed_m_s: float) -> None:
         """Move the setpoint by one period, within speed and acceleration."""
-        way = target[:3, 3] - self._goal[:3, 3]
-        turn = turn_between(self._goal, target)
-        left = max(float(np.linalg.norm(way)), _LEVER_M * float(np.linalg.norm(turn)))
-        if left < _ARRIVED_M / 100:
+        way = Way.between(self._goal, target)
+        left_m = way.length_m
+        if left_m < ARRIVED_M / 100:
             self._goal, self._speed_m_s = target.copy(), 0.0
             self._waited += 1
             return
         self._waited = 0
-        most, dt = self._policy.acceleration_m_s2, self._driver.period_s
-        braking = math.sqrt(2 * most * left)
-        self._speed_m_s = min(self._speed_m_s + most * dt, speed_m_s, braking)
-        share = min(self._speed_m_s * dt / left, 1.0)
-        self._goal = turned(self._goal, share * turn)
-        self._goal[:3, 3] += share * way
+        acceleration, dt = self._policy.acceleration_m_s2, self._driver.period_s
+        self._speed_m_s = next_speed_m_s(self._speed_m_s, speed_m_s, left_m, acceleration, dt)
+        self._goal = way.gone(self._goal, min(self._speed_m_s * dt / left_m, 1.0))
 
     def tare(self) -> None:
         """Take the mean of what the empty, resting hand reads as the bias.
@@ -370,56 +252,9 @@ class DrivenRobot:
 
     def _follows(self) -> bool:
         """Whether the arm is near its setpoint, and comes to rest at the last one of a motion."""
-        late = self._waited * self._driver.period_s > _SETTLE_S and self._lag_m() > _LAG_M
+        late = self._waited * self._driver.period_s > _SETTLE_S and self._lag_m() > LAG_M
         return self._lag_m() < _LOST_M and not late
 
     def _at(self, target: Float[np.ndarray, "4 4"]) -> bool:
         """Whether the target was commanded and the arm is there."""
-        if self._lag_m() > _LAG_M:
-            return False
-        way = float(np.linalg.norm(target[:3, 3] - self._goal[:3, 3]))
-        turn = float(np.linalg.norm(turn_between(self._goal, target)))
-        return way <= _ARRIVED_M and turn <= _ARRIVED_RAD
-
-
-def world_from_gripper(driver: Driver, calibration: Calibration) -> Float[np.ndarray, "4 4"]:
-    """Where the pad is measured to be in WCS."""
-    world_from_flange = calibration.world_from_base @ driver.base_from_flange()
-    return np.asarray(world_from_flange @ calibration.flange_from_gripper)
-
-
-def in_range(depth_m: Float[np.ndarray, "h w"], camera: PinholeCamera) -> Float[np.ndarray, "h w"]:
-    """A depth picture without what its camera cannot measure, NaN included.
-
-    Parameters
-    ----------
-    depth_m
-        Depth along the camera's z [m], shape (h, w).
-    camera
-        Its size and range.
-
-    Returns
-    -------
-    The same, 0 where nothing was measured.
-
-    Raises
-    ------
-    CalibrationError
-        The picture is of another size than its camera, or looks like millimetres.
-    """
-    if depth_m.shape != (camera.height_px, camera.width_px):
-        raise CalibrationError(
-            f"{camera.name}: the driver's picture is {depth_m.shape[1]} by {depth_m.shape[0]} "
-            f"pixels, and the calibrated one {camera.width_px} by {camera.height_px}",
-            "Calibrate the stream that the driver gives",
-        )
-    measured = np.isfinite(depth_m) & (depth_m > 0)
-    kept = measured & (depth_m >= camera.near_m) & (depth_m <= camera.far_m)
-    if measured.any() and not kept.any():
-        raise CalibrationError(
-            f"{camera.name}: the nearest depth is {depth_m[measured].min():g} m and the farthest "
-            f"{depth_m[measured].max():g} m, all out of its range of {camera.near_m:g} to "
-            f"{camera.far_m:g} m",
-            "Give depth in metres: drivers often give millimetres",
-        )
-    return np.where(kept, depth_m, 0.0)
+        return self._lag_m() <= LAG_M and Way.between(self._goal, target).is_done
