@@ -13,21 +13,26 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property, partial
+from itertools import islice
 from pathlib import Path
 from types import ModuleType
 from typing import Any, TypeVar
+
+from loguru import logger
 
 from pipeline.errors import MachineError, SoftgripError
 from pipeline.execution.executors import too_long
 from pipeline.execution.packed_items import ItemPacker, unpack_item
 from pipeline.execution.ray_cluster import MOST_RETRIES, connected, enter
 from pipeline.execution.run_store import Place, RunStore
-from pipeline.execution.stored_items import Done, run_from_store
+from pipeline.execution.stored_items import Done, run_from_store, timed
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 
-AHEAD_PER_CPU = 2  # items in flight, so that a slow driver bounds memory
+AHEAD_PER_CPU = 2  # tasks in flight, so that a slow driver bounds memory
+TASK_S = 1.0  # long beside what a task costs the driver, short beside what a killed node loses
+MOST_ITEMS = 64  # of a task: results come together, and progress is shown by them
 NODE_BACK_WITHIN_S = 120.0  # a node that starts anew takes a minute or so
 
 
@@ -112,13 +117,63 @@ def _in_order(
     """Results in the order of the items, of a bounded number of items in flight."""
     remote = ray.remote(num_cpus=1, max_retries=MOST_RETRIES)(_run_there)
     ahead = AHEAD_PER_CPU * max(1, int(ray.cluster_resources().get("CPU", 1)))
-    waiting: deque[Any] = deque()
-    for item in items:
-        waiting.append(remote.remote(*sending.message(named, item)))
-        if len(waiting) >= ahead:
-            yield _result(waiting.popleft(), sending, lost, limit_s)
-    while waiting:
-        yield _result(waiting.popleft(), sending, lost, limit_s)
+    size, following = TaskSize(), iter(items)
+    waiting: deque[tuple[list[Item], Any]] = deque()
+
+    def send(some: list[Item]) -> tuple[list[Item], Any]:
+        return some, remote.remote(*sending.message(named, some))
+
+    while True:
+        while len(waiting) < ahead and (some := list(islice(following, size.items))):
+            waiting.append(send(some))
+        if not waiting:
+            return
+        some, sent = waiting.popleft()
+        if len(some) > 1:
+            try:
+                made = result_of(sent, sending, limit_s * len(some))
+            except Exception as error:  # noqa: BLE001 - raised again by the item that it is of
+                logger.debug("{} items are made one by one: {}", len(some), error)
+                for one in some:
+                    yield from _result(send([one])[1], sending, lost, limit_s).results
+                continue
+        else:
+            made = _result(sent, sending, lost, limit_s)
+        size.learn(made.seconds, len(some))
+        yield from made.results
+
+
+class TaskSize:
+    """How many items a task holds: as many as take a second, and no fewer than one.
+
+    A task costs the driver some two milliseconds, whatever it holds. Only tasks of more than one
+    item are so short that this matters, and how long an item takes is known when the first are
+    there.
+    """
+
+    def __init__(self) -> None:
+        self.items = 1
+
+    def learn(self, seconds: float, items: int) -> None:
+        """Note what a task took; the next ones are at most twice as large."""
+        fitting = int(TASK_S * items / max(seconds, 1e-9))
+        self.items = max(1, min(fitting, 2 * items, MOST_ITEMS))
+
+
+@dataclass(frozen=True)
+class Made:
+    """What came back of a task.
+
+    Attributes
+    ----------
+    seconds
+        That its items took on the node [s].
+    results
+        Of its items, in order.
+    """
+
+    seconds: float
+    results: list[Any]
 
 
 @dataclass(frozen=True)
@@ -141,24 +196,24 @@ class Sending:
         """Packs all items; with a store their paths travel as keys."""
         return ItemPacker(self.store.roots.key_of if self.store else None)
 
-    def message(self, job: JobByName, item: Any) -> tuple[bytes, str | Place, str]:
+    def message(self, job: JobByName, items: list[Any]) -> tuple[bytes, str | Place, str]:
         """What `_run_there` is given."""
         place = self.store.place if self.store else str(Path.cwd())
-        return self.packer.pack((job, item)), place, program_name()
+        return self.packer.pack((job, items)), place, program_name()
 
-    def result(self, answer: bytes) -> Any:
-        """What the job made; files that its node put in the store are here."""
+    def result(self, answer: bytes) -> Made:
+        """What the job made of the items; files that their node put in the store are here."""
         names = {program_name(): "__main__"}
         if self.store is None:
-            return unpack_item(answer, names)
+            return Made(*unpack_item(answer, names))
         done: Done = unpack_item(answer, names, self.store.roots.path_of)
         if self.bring:
             self.store.bring(done.put, done.removed)
-        return done.result
+        return Made(*done.result)
 
 
-def _result(sent: Any, sending: Sending, lost: Callable[[str], Any] | None, limit_s: float) -> Any:
-    """The result of an item, waited for; a worker's death after all retries is told or ``lost``."""
+def _result(sent: Any, sending: Sending, lost: Callable[[str], Any] | None, limit_s: float) -> Made:
+    """The result of one item; a worker's death after all retries is told or ``lost``."""
     import ray
     from ray.exceptions import GetTimeoutError, OutOfMemoryError, WorkerCrashedError
 
@@ -171,7 +226,8 @@ def _result(sent: Any, sending: Sending, lost: Callable[[str], Any] | None, limi
     except (OutOfMemoryError, WorkerCrashedError) as error:
         memory = isinstance(error, OutOfMemoryError)
         if lost is not None:
-            return lost("took the memory of its node" if memory else "ended its Ray worker")
+            how = "took the memory of its node" if memory else "ended its Ray worker"
+            return Made(math.inf, [lost(how)])
         raise SoftgripError(
             "A node of the Ray cluster ran out of memory again and again"
             if memory
@@ -181,8 +237,8 @@ def _result(sent: Any, sending: Sending, lost: Callable[[str], Any] | None, limi
         ) from error
 
 
-def result_of(sent: Any, sending: Sending, limit_s: float) -> Any:
-    """What `_run_there` made of an item, waited for.
+def result_of(sent: Any, sending: Sending, limit_s: float) -> Made:
+    """What `_run_there` made of some items, waited for.
 
     Parameters
     ----------
@@ -195,12 +251,12 @@ def result_of(sent: Any, sending: Sending, limit_s: float) -> Any:
 
     Returns
     -------
-    The result.
+    The results.
 
     Raises
     ------
     SoftgripError
-        It took longer, or no node is left; what the item raises itself arrives as it was raised.
+        It took longer, or no node is left; what an item raises itself arrives as it was raised.
     """
     import ray
     from ray.exceptions import GetTimeoutError, RayTaskError
@@ -279,7 +335,7 @@ class Worker:
 
 
 def _run_there(sent: bytes, place: str | Place, program: str) -> bytes:
-    """On a node: a pickled job and item in, its pickled result out.
+    """On a node: a packed job and items in; how long they took, and their results, packed out.
 
     Ray's own pickling would take the classes of a program along; there, they would be others than
     those of the module.
@@ -287,7 +343,7 @@ def _run_there(sent: bytes, place: str | Place, program: str) -> bytes:
     Parameters
     ----------
     sent
-        `JobByName` and the item.
+        `JobByName` and the items.
     place
         Folder that relative paths start from; or the store in which the run lies.
     program
@@ -295,10 +351,10 @@ def _run_there(sent: bytes, place: str | Place, program: str) -> bytes:
 
     Returns
     -------
-    What the job makes of the item.
+    What `Made` is made of.
     """
     if isinstance(place, Place):
         return run_from_store(sent, place, program)
     enter(place)
-    job, item = unpack_item(sent, {"__main__": program})
-    return ItemPacker().pack(job(item))
+    job, items = unpack_item(sent, {"__main__": program})
+    return ItemPacker().pack(timed(job, items))

@@ -132,7 +132,7 @@ def _in_order(
             message, process, ref = waiting.popleft()
             process.holds -= 1
             try:
-                return result_of(ref, sending, limit_s)
+                return result_of(ref, sending, limit_s).results[0]
             except ray.exceptions.RayActorError as error:
                 if process in living:
                     living.remove(process)
@@ -145,7 +145,7 @@ def _in_order(
                 waiting.appendleft(sent(message))
 
     for item in items:
-        waiting.append(sent(sending.message(job, item)))
+        waiting.append(sent(sending.message(job, [item])))
         if len(waiting) >= AHEAD_PER_NODE * len(living):
             yield next_result()
     while waiting:

@@ -22,7 +22,9 @@ from pipeline.artifacts.sharding import (
     INDEX_TOPIC,
     index_message,
     listed_shards,
+    read_index,
     remove_unnamed,
+    shard_of,
 )
 from pipeline.artifacts.tensors import from_tensor, tensors_of, to_tensor
 from pipeline.artifacts.writing import ArtifactWriter
@@ -167,10 +169,10 @@ def read_scene(path: Path, index: int) -> ClutterScene:
     with open_artifact(path) as artifact:
         if INDEX_TOPIC not in artifact.counts():
             return _whole_scene(artifact, index)
-    files = listed_shards(path)
-    if index >= len(files):
+    entries = read_index(path).shards
+    if index >= len(entries):
         raise ArtifactError(f"{path} holds no scene {index}", "Make the scenes again")
-    with open_artifact(files[index]) as artifact:
+    with open_artifact(shard_of(path, entries[index])) as artifact:
         return _whole_scene(artifact, 0)
 
 
