@@ -221,19 +221,28 @@ def pairs_of(
 
 
 @njit(error_model="numpy")
-def heights_on(
+def draw_pairs(
     seen: Float[np.ndarray, " 144"],
+    order: Int[np.ndarray, " v"],
     x: Float[np.ndarray, " v"],
     y: Float[np.ndarray, " v"],
     pair_at: Int[np.ndarray, " pairs"],
     pair_lane: Int[np.ndarray, " pairs"],
     pairs: int,
     top: float,
-    pair_z: Float[np.ndarray, " pairs"],
+    number: int,
+    height: Float[np.ndarray, " v"],
+    body: Int[np.ndarray, " v"],
+    so_far: Float[np.ndarray, " v"],
 ) -> None:
-    """Height of each pair's triangle at its point; -inf where it does not cover it below top."""
-    for number in range(pairs):
-        i, k = _at(pair_at[_at(number)]), _at(pair_lane[_at(number)])
+    """Height and body at each pair's point, where its triangle covers it below top and above what
+    is there.
+
+    One pair after the other: in SIMD lanes its eleven look-ups would be gathered, which takes
+    longer than all of its arithmetic.
+    """
+    for pair in range(pairs):
+        i, k = _at(pair_at[_at(pair)]), _at(pair_lane[_at(pair)])
         a_x, a_y = seen[k] - x[i], seen[LANES + k] - y[i]
         b_x, b_y = seen[3 * LANES + k] - x[i], seen[4 * LANES + k] - y[i]
         c_x, c_y = seen[6 * LANES + k] - x[i], seen[7 * LANES + k] - y[i]
@@ -243,4 +252,7 @@ def heights_on(
         z = (of_a * a_z + of_b * b_z + of_c * c_z) / whole
         z = min(max(z, min(min(a_z, b_z), c_z)), max(max(a_z, b_z), c_z))
         inside = (min(min(of_a, of_b), of_c) >= 0.0) | (max(max(of_a, of_b), of_c) <= 0.0)
-        pair_z[_at(number)] = z if inside & (whole != 0.0) & (z <= top) else -np.inf
+        point = _at(order[i])
+        if inside & (whole != 0.0) & (z <= top) & (z > height[point]):
+            height[point], so_far[i] = z, np.float32(z)
+            body[point] = number

@@ -16,7 +16,7 @@ from pipeline.world.covered_points import (
     SINGLE,
     around_block,
     bound_triangles,
-    heights_on,
+    draw_pairs,
     near_points,
     pairs_of,
     place_triangles,
@@ -182,16 +182,15 @@ def _draw(
         np.empty(LANES * len(x), dtype=np.int64),
         np.empty(LANES * len(x), dtype=np.int64),
     )
-    pair_z = np.empty(LANES * len(x))
     for row in range(len(frames)):
         turn = _frame_from_body(frames[row], pose)
         ready = False
         node_at[0], top_at[0] = len(first) - 1, np.inf
         cells_at[0, 0], cells_at[0, 1], cells_at[0, 2], cells_at[0, 3] = 0, CELLS, 0, CELLS
         waiting = 1
-        slack = SINGLE * (
-            extent + reach + abs(top) + np.abs(turn[:, 3]).sum() + np.abs(centre).sum()
-        )
+        away = abs(turn[0, 3]) + abs(turn[1, 3]) + abs(turn[2, 3])
+        away += abs(centre[0]) + abs(centre[1]) + abs(centre[2])
+        slack = SINGLE * (extent + reach + abs(top) + away)
         near_slack = np.float32(slack)
         for axis in range(3):
             for other in range(3):
@@ -233,6 +232,9 @@ def _draw(
                     so_far[i] = np.float32(height[order[i]])
                 ready = True
             bound_triangles(near[node], near_turn, near_reach, near_slack, edges, sides)
+            # Lanes without a triangle are points, which have no lines to be outside of.
+            for k in range(count[node], LANES):
+                edges[9 * LANES + k] = -np.inf
             points = points_within(
                 around_block(sides, near_slack),
                 lower,
@@ -248,13 +250,9 @@ def _draw(
                 continue
             place_triangles(corners[node], turn, seen)
             pairs = pairs_of(found_at, found_lanes, found, pair_at, pair_lane)
-            heights_on(seen, x, y, pair_at, pair_lane, pairs, top, pair_z)
-            for pair in range(pairs):
-                at, z = _at(pair_at[_at(pair)]), pair_z[_at(pair)]
-                point = _at(order[at])
-                if z > height[point]:
-                    height[point], so_far[at] = z, np.float32(z)
-                    body[point] = number
+            draw_pairs(
+                seen, order, x, y, pair_at, pair_lane, pairs, top, number, height, body, so_far
+            )
 
 
 @njit(error_model="numpy")
