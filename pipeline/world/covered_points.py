@@ -36,8 +36,8 @@ _at = np.uint64
 def bound_triangles(
     corners: Float[np.ndarray, " 144"],
     turn: Float[np.ndarray, " 12"],
-    reach: float,
-    slack: float,
+    reach: np.float32,
+    slack: np.float32,
     edges: Float[np.ndarray, " 160"],
     sides: Float[np.ndarray, " 80"],
 ) -> None:
@@ -114,8 +114,8 @@ def place_triangles(
 
 @njit(error_model="numpy", fastmath={"reassoc", "nsz", "nnan"})
 def around_block(
-    sides: Float[np.ndarray, " 80"], slack: float
-) -> tuple[float, float, float, float, float]:
+    sides: Float[np.ndarray, " 80"], slack: np.float32
+) -> tuple[np.float32, np.float32, np.float32, np.float32, np.float32]:
     """Left, right, low, high and top of a rectangle around all triangles of a block [m]."""
     left, right, low, high = sides[0], sides[LANES], sides[2 * LANES], sides[3 * LANES]
     top = sides[4 * LANES]
@@ -128,7 +128,7 @@ def around_block(
 
 @njit(error_model="numpy")
 def points_within(
-    around: tuple[float, float, float, float, float],
+    around: tuple[np.float32, np.float32, np.float32, np.float32, np.float32],
     lower: Float[np.ndarray, " 2"],
     per_m: float,
     rows: Int[np.ndarray, "cells more"],

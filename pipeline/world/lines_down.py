@@ -235,7 +235,7 @@ def _draw(
             # Lanes without a triangle are points, which have no lines to be outside of.
             for k in range(count[node], LANES):
                 edges[9 * LANES + k] = -np.inf
-            points = points_within(
+            sifted = points_within(
                 around_block(sides, near_slack),
                 lower,
                 per_m,
@@ -245,7 +245,7 @@ def _draw(
                 so_far,
                 found_at,
             )
-            found = near_points(edges, near_x, near_y, so_far, found_at, points, found_lanes)
+            found = near_points(edges, near_x, near_y, so_far, found_at, sifted, found_lanes)
             if found == 0:
                 continue
             place_triangles(corners[node], turn, seen)
