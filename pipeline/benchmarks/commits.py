@@ -61,19 +61,23 @@ def compare(given: asked.Plain, questions: Sequence[str]) -> dict[str, float]:
     -------
     Question → ratio of processor time; empty where the history lacks the commit.
     """
-    root = Path(__file__).parents[2]
-    if not in_history(root, OLDER):
+    if not in_history(Path(__file__).parents[2], OLDER):
         logger.warning("No comparison with commit {}: it is not in this folder's history", OLDER)
         return {}
     with tempfile.TemporaryDirectory() as scratch, ExitStack() as stack:
-        file = Path(scratch) / "given.pickle"
-        file.write_bytes(pickle.dumps(given))
-        checkout = stack.enter_context(worktree(root, OLDER, Path(scratch) / "older"))
-        sides = [
-            stack.enter_context(asking(checkout, file, "older")),
-            stack.enter_context(asking(root, file, "this")),
-        ]
+        sides = sides_of(given, Path(scratch), stack)
         return {question: turns(sides, question) for question in questions}
+
+
+def sides_of(given: asked.Plain, scratch: Path, stack: ExitStack) -> list["subprocess.Popen[str]"]:
+    """Processes that answer by the older commit and by this one, until the stack is closed."""
+    root, file = Path(__file__).parents[2], scratch / "given.pickle"
+    file.write_bytes(pickle.dumps(given))
+    checkout = stack.enter_context(worktree(root, OLDER, scratch / "older"))
+    return [
+        stack.enter_context(asking(checkout, file, "older")),
+        stack.enter_context(asking(root, file, "this")),
+    ]
 
 
 def in_history(root: Path, commit: str) -> bool:
