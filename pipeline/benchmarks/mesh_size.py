@@ -103,9 +103,9 @@ if __name__ == "__main__":
         answer: object = heights_by_faces()
     else:
         run, wanted = Path(sys.argv[1]), sys.argv[2]
-        scenes = {scene.scene_id: scene for scene in read_scenes(run / "scenes.mcap")}
+        clutter = next(s for s in read_scenes(run / "scenes.mcap") if s.scene_id == wanted)
         surfaces = {
             name: item.mesh for name, (item, _) in read_objects(run / "objects.mcap").items()
         }
-        answer = labelling_by_faces(scenes[wanted], surfaces)
+        answer = labelling_by_faces(clutter, surfaces)
     sys.stdout.write(json.dumps(answer) + "\n")

@@ -87,6 +87,6 @@ def least(turns: Sequence[Mapping[str, float]]) -> dict[str, float]:
 
 if __name__ == "__main__":
     run, wanted = Path(sys.argv[1]), sys.argv[2]
-    scenes = {scene.scene_id: scene for scene in read_scenes(run / "scenes.mcap")}
+    clutter = next(s for s in read_scenes(run / "scenes.mcap") if s.scene_id == wanted)
     surfaces = {name: item.mesh for name, (item, _) in read_objects(run / "objects.mcap").items()}
-    sys.stdout.write(json.dumps(steps_of_both(scenes[wanted], surfaces), indent=1) + "\n")
+    sys.stdout.write(json.dumps(steps_of_both(clutter, surfaces), indent=1) + "\n")
