@@ -4,6 +4,7 @@ Run as a script by `pipeline.benchmarks.commits`, in a checkout of this commit a
 what differs between the two is looked up by name. Answers are seconds of this process's processor.
 """
 
+import cProfile
 import importlib
 import pickle
 import sys
@@ -97,14 +98,22 @@ def solve(problems: Plain) -> None:
 
 
 def answer(given: Plain, older: bool) -> None:
-    """Answer each line of standard input, "label" or "solve", with seconds, until it ends."""
+    """Answer each line of standard input with seconds, until it ends.
+
+    Lines are "label", "solve", or "profile" and a file for what a profiler sees of labelling.
+    """
     label = (older_commit if older else this_commit)(given)
     with tempfile.TemporaryDirectory() as scratch:
         path = Path(scratch) / "grasps.mcap"
         for line in sys.stdin:
             started = time.process_time()
-            if line.strip() == "label":
+            question, *words = line.split()
+            if question == "label":
                 label(path)
+            elif question == "profile":
+                profiler = cProfile.Profile(time.process_time)
+                profiler.runcall(label, path)
+                profiler.dump_stats(words[0])
             else:
                 solve(given["problems"])
             sys.stdout.write(f"{time.process_time() - started}\n")

@@ -5,7 +5,7 @@ import pickle
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
@@ -41,24 +41,43 @@ def against_older(
     Ratios of processor time by their names in bench.json; none where the history lacks the commit,
     as in a source archive or a shallow clone.
     """
-    root = Path(__file__).parents[2]
-    if not in_history(root, OLDER):
+    few = problems[:: -(-len(problems) // PROBLEMS)]
+    ratios = compare(plain(scene, meshes, few), ("label", "solve"))
+    names = {"label": f"labelling_vs_{OLDER}", "solve": f"qp_vs_{OLDER}"}
+    return {names[question]: round(ratio, 2) for question, ratio in ratios.items()}
+
+
+def compare(given: asked.Plain, questions: Sequence[str]) -> dict[str, float]:
+    """How many times as fast as commit 19217de each question is answered.
+
+    Parameters
+    ----------
+    given
+        What both sides are given.
+    questions
+        "label", and "solve" where problems are given.
+
+    Returns
+    -------
+    Question → ratio of processor time; empty where the history lacks the commit.
+    """
+    if not in_history(Path(__file__).parents[2], OLDER):
         logger.warning("No comparison with commit {}: it is not in this folder's history", OLDER)
         return {}
-    few = problems[:: -(-len(problems) // PROBLEMS)]
     with tempfile.TemporaryDirectory() as scratch, ExitStack() as stack:
-        given = Path(scratch) / "given.pickle"
-        given.write_bytes(pickle.dumps(plain(scene, meshes, few)))
-        checkout = stack.enter_context(worktree(root, OLDER, Path(scratch) / "older"))
-        sides = [
-            stack.enter_context(asking(checkout, given, "older")),
-            stack.enter_context(asking(root, given, "this")),
-        ]
-        ratios = {question: turns(sides, question) for question in ("label", "solve")}
-    return {
-        f"labelling_vs_{OLDER}": round(ratios["label"], 2),
-        f"qp_vs_{OLDER}": round(ratios["solve"], 2),
-    }
+        sides = sides_of(given, Path(scratch), stack)
+        return {question: turns(sides, question) for question in questions}
+
+
+def sides_of(given: asked.Plain, scratch: Path, stack: ExitStack) -> list["subprocess.Popen[str]"]:
+    """Processes that answer by the older commit and by this one, until the stack is closed."""
+    root, file = Path(__file__).parents[2], scratch / "given.pickle"
+    file.write_bytes(pickle.dumps(given))
+    checkout = stack.enter_context(worktree(root, OLDER, scratch / "older"))
+    return [
+        stack.enter_context(asking(checkout, file, "older")),
+        stack.enter_context(asking(root, file, "this")),
+    ]
 
 
 def in_history(root: Path, commit: str) -> bool:
@@ -127,19 +146,7 @@ def plain(
     for matrix, problem, count in zip(matrices, problems, counts, strict=True):
         matrix[:, :count] = problem.wrench_matrix
     first = max(problems, key=lambda problem: problem.vacuum_force)  # the limits are its multiples
-    names = ("scene_id", "level", "split", "seed", "gaps_m", "contacts", "settle_time_s")
-    return {
-        # Training scenes may draw noise several times, others draw it once.
-        "scene": {name: getattr(scene, name) for name in names} | {"split": "test"},
-        "objects": [vars(item) for item in scene.objects],
-        "views": [vars(view) | {"camera": vars(view.camera)} for view in scene.views],
-        "meshes": {
-            item.object_name: (
-                np.array(meshes[item.object_name].vertices_m),
-                np.array(meshes[item.object_name].faces),
-            )
-            for item in scene.objects
-        },
+    return plain_scene(scene, meshes) | {
         "problems": {
             "matrices": matrices,
             "counts": counts,
@@ -152,5 +159,23 @@ def plain(
                 first.weight_spread,
                 first.max_iterations,
             ),
+        },
+    }
+
+
+def plain_scene(scene: ClutterScene, meshes: Mapping[str, Mesh]) -> asked.Plain:
+    """A scene and the meshes of its objects, as arrays and plain values."""
+    names = ("scene_id", "level", "split", "seed", "gaps_m", "contacts", "settle_time_s")
+    return {
+        # Training scenes may draw noise several times, others draw it once.
+        "scene": {name: getattr(scene, name) for name in names} | {"split": "test"},
+        "objects": [vars(item) for item in scene.objects],
+        "views": [vars(view) | {"camera": vars(view.camera)} for view in scene.views],
+        "meshes": {
+            item.object_name: (
+                np.array(meshes[item.object_name].vertices_m),
+                np.array(meshes[item.object_name].faces),
+            )
+            for item in scene.objects
         },
     }

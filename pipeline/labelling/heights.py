@@ -5,17 +5,22 @@ are rounded to single precision (some 1e-7 of the scene, which moves what lies a
 are not; elsewhere both find the same within 1e-8 m.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Float, Int
 
+from pipeline.geometry.mesh import Mesh
 from pipeline.gripper.pad import Pad
 from pipeline.world.lines_down import PosedBlocks, follow_lines
 from pipeline.world.raycasting import Surfaces
 from pipeline.world.triangle_blocks import blocks_of, mean_area_m2
 
-# Rays are quicker where triangles are smaller than this: a fifth of what a vertex of the pad of
+# Rays are quicker where triangles are smaller than this: a tenth of what a vertex of the pad of
 # Table I has for itself. Measured in `runs/SPEED.md`.
-_FINEST_M2 = 0.7e-6
+_FINEST_M2 = 0.3e-6
+# Triangles of no area at all count as this small, so that nothing is divided by zero.
+_NO_AREA_M2 = 1e-18
 
 
 def pad_heights(
@@ -43,10 +48,28 @@ def pad_heights(
     (n, v), -1 for none.
     """
     bodies = surfaces.bodies
-    if bodies and all(mean_area_m2(mesh) >= _FINEST_M2 for mesh, _, _ in bodies):
+    if bodies and triangles_per_m2([mesh for mesh, _, _ in bodies]) <= 1.0 / _FINEST_M2:
         posed = [PosedBlocks(blocks_of(mesh), pose, number) for mesh, pose, number in bodies]
         return follow_lines(posed, world_from_contact, pad.vertices_xy_m, clearance_m)
     return pad_heights_by_rays(world_from_contact, surfaces, pad, clearance_m)
+
+
+def triangles_per_m2(meshes: Sequence[Mesh]) -> float:
+    """Triangles under a pad on one of these bodies, on the mean, for each square metre of it.
+
+    Bodies of long triangles alone, like a table, do not count: they cost nothing.
+
+    Parameters
+    ----------
+    meshes
+        Surfaces of the bodies [m].
+
+    Returns
+    -------
+    Mean over bodies of what their triangles' mean areas [m2] go into one; 0 where none counts.
+    """
+    areas = [area for mesh in meshes if np.isfinite(area := mean_area_m2(mesh))]
+    return float(np.mean([1.0 / max(area, _NO_AREA_M2) for area in areas])) if areas else 0.0
 
 
 def pad_heights_by_rays(

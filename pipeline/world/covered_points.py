@@ -19,8 +19,8 @@ from pipeline.world.triangle_blocks import LANES
 
 # Rounding of bounds in single precision, sixteen operations, as a share of the lengths.
 SINGLE = 1e-6
-# Rounding of a block's rectangle in double precision, in cells.
-_DOUBLE = 1e-9
+# Rounding of a point's place among cells, as a share of a cell.
+_CELL = 1e-4
 # Weight of each lane in a sum that names a set of lanes; exact in single precision.
 _LANE_BIT = (2.0 ** np.arange(LANES)).astype(np.float32)
 # Lane of a power of two by its rest modulo 19, which differs for each power below 2^18.
@@ -31,23 +31,28 @@ _LANE_OF[[(1 << lane) % 19 for lane in range(LANES)]] = np.arange(LANES)
 _at = np.uint64
 
 
-@njit(error_model="numpy")
-def place_triangles(
+# Sums in any order and fused products are safe in bounds: they have room.
+@njit(error_model="numpy", fastmath={"contract", "reassoc", "nsz", "nnan"})
+def bound_triangles(
     corners: Float[np.ndarray, " 144"],
-    turn: Float[np.ndarray, "3 4"],
-    reach: float,
-    seen: Float[np.ndarray, " 144"],
+    turn: Float[np.ndarray, " 12"],
+    reach: np.float32,
+    slack: np.float32,
     edges: Float[np.ndarray, " 160"],
-    rectangle: Float[np.ndarray, " 64"],
+    sides: Float[np.ndarray, " 80"],
 ) -> None:
-    """Corners of a block's triangles in the frame, and bounds on what each may cover.
+    """Bounds on what a block's triangles may cover, all in single precision.
 
     Row by row ``edges`` has x, y and 1's factors of three lines, below zero where a point is
-    outside for certain, and a bound above the highest corner.
+    outside for certain, and a bound above the highest corner. ``sides`` has the lowest and highest
+    x, the lowest and highest y, and the highest z of each triangle. Corners are known to within
+    ``slack``, which moves a line by no more than twelve times that times the triangle's sides: for
+    three if both ends move, and for as much again as twice the area may have if its sign is wrong.
     """
-    ux, uy, uz, tx = turn[0, 0], turn[0, 1], turn[0, 2], turn[0, 3]
-    vx, vy, vz, ty = turn[1, 0], turn[1, 1], turn[1, 2], turn[1, 3]
-    wx, wy, wz, tz = turn[2, 0], turn[2, 1], turn[2, 2], turn[2, 3]
+    ux, uy, uz, tx = turn[0], turn[1], turn[2], turn[3]
+    vx, vy, vz, ty = turn[4], turn[5], turn[6], turn[7]
+    wx, wy, wz, tz = turn[8], turn[9], turn[10], turn[11]
+    one, single, twelve = np.float32(1.0), np.float32(SINGLE), np.float32(12.0)
     for k in range(LANES):
         x, y, z = corners[k], corners[LANES + k], corners[2 * LANES + k]
         a_x, a_y = ux * x + uy * y + uz * z + tx, vx * x + vy * y + vz * z + ty
@@ -58,84 +63,123 @@ def place_triangles(
         x, y, z = corners[6 * LANES + k], corners[7 * LANES + k], corners[8 * LANES + k]
         c_x, c_y = ux * x + uy * y + uz * z + tx, vx * x + vy * y + vz * z + ty
         c_z = wx * x + wy * y + wz * z + tz
-        seen[k], seen[LANES + k], seen[2 * LANES + k] = a_x, a_y, a_z
-        seen[3 * LANES + k], seen[4 * LANES + k], seen[5 * LANES + k] = b_x, b_y, b_z
-        seen[6 * LANES + k], seen[7 * LANES + k], seen[8 * LANES + k] = c_x, c_y, c_z
-        rectangle[k], rectangle[LANES + k] = min(min(a_x, b_x), c_x), max(max(a_x, b_x), c_x)
-        rectangle[2 * LANES + k], rectangle[3 * LANES + k] = (
-            min(min(a_y, b_y), c_y),
-            max(max(a_y, b_y), c_y),
-        )
-        highest = max(max(a_z, b_z), c_z)
-        edges[9 * LANES + k] = np.float32(highest + SINGLE * abs(highest))
+        left, right = min(min(a_x, b_x), c_x), max(max(a_x, b_x), c_x)
+        low, high = min(min(a_y, b_y), c_y), max(max(a_y, b_y), c_y)
+        top = max(max(a_z, b_z), c_z) + slack
+        sides[k], sides[LANES + k] = left, right
+        sides[2 * LANES + k], sides[3 * LANES + k] = low, high
+        sides[4 * LANES + k], edges[9 * LANES + k] = top, top
+        apart = twelve * slack * (right - left + high - low + slack)
         # The sign of twice the area turns all lines inwards.
         area = (b_x - a_x) * (c_y - a_y) - (b_y - a_y) * (c_x - a_x)
-        sign = 1.0 if area >= 0.0 else -1.0
+        sign = one if area >= np.float32(0.0) else -one
         n_x, n_y = sign * (b_y - c_y), sign * (c_x - b_x)
-        slack = SINGLE * (abs(n_x) * (abs(b_x) + reach) + abs(n_y) * (abs(b_y) + reach))
+        room = single * (abs(n_x) * (abs(b_x) + reach) + abs(n_y) * (abs(b_y) + reach)) + apart
         edges[k], edges[LANES + k] = n_x, n_y
-        edges[2 * LANES + k] = slack - (n_x * b_x + n_y * b_y)
+        edges[2 * LANES + k] = room - (n_x * b_x + n_y * b_y)
         n_x, n_y = sign * (c_y - a_y), sign * (a_x - c_x)
-        slack = SINGLE * (abs(n_x) * (abs(c_x) + reach) + abs(n_y) * (abs(c_y) + reach))
+        room = single * (abs(n_x) * (abs(c_x) + reach) + abs(n_y) * (abs(c_y) + reach)) + apart
         edges[3 * LANES + k], edges[4 * LANES + k] = n_x, n_y
-        edges[5 * LANES + k] = slack - (n_x * c_x + n_y * c_y)
+        edges[5 * LANES + k] = room - (n_x * c_x + n_y * c_y)
         n_x, n_y = sign * (a_y - b_y), sign * (b_x - a_x)
-        slack = SINGLE * (abs(n_x) * (abs(a_x) + reach) + abs(n_y) * (abs(a_y) + reach))
+        room = single * (abs(n_x) * (abs(a_x) + reach) + abs(n_y) * (abs(a_y) + reach)) + apart
         edges[6 * LANES + k], edges[7 * LANES + k] = n_x, n_y
-        edges[8 * LANES + k] = slack - (n_x * a_x + n_y * a_y)
+        edges[8 * LANES + k] = room - (n_x * a_x + n_y * a_y)
 
 
 @njit(error_model="numpy")
+def place_triangles(
+    corners: Float[np.ndarray, " 144"],
+    turn: Float[np.ndarray, "3 4"],
+    seen: Float[np.ndarray, " 144"],
+) -> None:
+    """Corners of a block's triangles in the frame, in double precision."""
+    ux, uy, uz, tx = turn[0, 0], turn[0, 1], turn[0, 2], turn[0, 3]
+    vx, vy, vz, ty = turn[1, 0], turn[1, 1], turn[1, 2], turn[1, 3]
+    wx, wy, wz, tz = turn[2, 0], turn[2, 1], turn[2, 2], turn[2, 3]
+    for k in range(LANES):
+        x, y, z = corners[k], corners[LANES + k], corners[2 * LANES + k]
+        seen[k] = ux * x + uy * y + uz * z + tx
+        seen[LANES + k] = vx * x + vy * y + vz * z + ty
+        seen[2 * LANES + k] = wx * x + wy * y + wz * z + tz
+        x, y, z = corners[3 * LANES + k], corners[4 * LANES + k], corners[5 * LANES + k]
+        seen[3 * LANES + k] = ux * x + uy * y + uz * z + tx
+        seen[4 * LANES + k] = vx * x + vy * y + vz * z + ty
+        seen[5 * LANES + k] = wx * x + wy * y + wz * z + tz
+        x, y, z = corners[6 * LANES + k], corners[7 * LANES + k], corners[8 * LANES + k]
+        seen[6 * LANES + k] = ux * x + uy * y + uz * z + tx
+        seen[7 * LANES + k] = vx * x + vy * y + vz * z + ty
+        seen[8 * LANES + k] = wx * x + wy * y + wz * z + tz
+
+
+@njit(error_model="numpy", fastmath={"reassoc", "nsz", "nnan"})
 def around_block(
-    rectangle: Float[np.ndarray, " 64"],
-    edges: Float[np.ndarray, " 160"],
-    count: int,
+    sides: Float[np.ndarray, " 80"], slack: np.float32
+) -> tuple[np.float32, np.float32, np.float32, np.float32, np.float32]:
+    """Left, right, low, high and top of a rectangle around all triangles of a block [m]."""
+    left, right, low, high = sides[0], sides[LANES], sides[2 * LANES], sides[3 * LANES]
+    top = sides[4 * LANES]
+    for k in range(LANES):
+        left, right = min(left, sides[k]), max(right, sides[LANES + k])
+        low, high = min(low, sides[2 * LANES + k]), max(high, sides[3 * LANES + k])
+        top = max(top, sides[4 * LANES + k])
+    return left - slack, right + slack, low - slack, high + slack, top
+
+
+@njit(error_model="numpy")
+def points_within(
+    around: tuple[np.float32, np.float32, np.float32, np.float32, np.float32],
     lower: Float[np.ndarray, " 2"],
     per_m: float,
-    cells: Int[np.ndarray, " 64"],
-) -> None:
-    """Cells around all triangles of a block, in lane 0; lanes without a triangle cover nothing."""
-    left, right, low, high = (
-        rectangle[0],
-        rectangle[LANES],
-        rectangle[2 * LANES],
-        rectangle[3 * LANES],
-    )
-    for k in range(1, count):
-        left, right = min(left, rectangle[k]), max(right, rectangle[LANES + k])
-        low, high = min(low, rectangle[2 * LANES + k]), max(high, rectangle[3 * LANES + k])
-    for k in range(count, LANES):
-        edges[9 * LANES + k] = -np.inf
-    left, right = (left - lower[0]) * per_m - _DOUBLE, (right - lower[0]) * per_m + _DOUBLE
-    low, high = (low - lower[1]) * per_m - _DOUBLE, (high - lower[1]) * per_m + _DOUBLE
-    cells[0] = np.int32(min(max(left, 0.0), float(CELLS)))
-    cells[LANES] = np.int32(max(min(right, CELLS - 1.0), -1.0) + 1.0)
-    cells[2 * LANES] = np.int32(min(max(low, 0.0), float(CELLS)))
-    cells[3 * LANES] = np.int32(max(min(high, CELLS - 1.0), -1.0) + 1.0)
+    rows: Int[np.ndarray, "cells more"],
+    x: Float[np.ndarray, " v"],
+    y: Float[np.ndarray, " v"],
+    so_far: Float[np.ndarray, " v"],
+    point_at: Int[np.ndarray, " more"],
+) -> int:
+    """Points in a rectangle that have nothing higher than its top yet; returns how many."""
+    left, right, low, high, top = around
+    # A cell more than the rectangle touches costs little, a cell too few would lose points.
+    first = np.int64(min(max((left - lower[0]) * per_m - _CELL, 0.0), float(CELLS)))
+    last = np.int64(max(min((right - lower[0]) * per_m + _CELL, CELLS - 1.0), -1.0) + 1.0)
+    bottom = np.int64(min(max((low - lower[1]) * per_m - _CELL, 0.0), float(CELLS)))
+    end = np.int64(max(min((high - lower[1]) * per_m + _CELL, CELLS - 1.0), -1.0) + 1.0)
+    count = 0
+    if first >= last:
+        return 0
+    for line in range(bottom, end):
+        for point in range(rows[_at(line), _at(first)], rows[_at(line), _at(last)]):
+            i = _at(point)
+            point_at[_at(count)] = point
+            count += (
+                (x[i] >= left)
+                & (x[i] <= right)
+                & (y[i] >= low)
+                & (y[i] <= high)
+                & (so_far[i] <= top)
+            )
+    return count
 
 
 @njit(error_model="numpy")
 def near_points(
     edges: Float[np.ndarray, " 160"],
-    cells: Int[np.ndarray, " 64"],
-    rows: Int[np.ndarray, "cells more"],
     x: Float[np.ndarray, " v"],
     y: Float[np.ndarray, " v"],
     so_far: Float[np.ndarray, " v"],
-    found_at: Int[np.ndarray, " more"],
+    point_at: Int[np.ndarray, " more"],
+    points: int,
     found_lanes: Int[np.ndarray, " more"],
 ) -> int:
-    """Points that a triangle may cover, and which may; returns how many."""
+    """Which of some points a triangle may cover, moved to the front, and which may; returns how
+    many."""
     found = 0
-    left, right = _at(cells[0]), _at(cells[LANES])
-    if left >= right:
-        return 0
-    for line in range(cells[2 * LANES], cells[3 * LANES]):
-        for point in range(rows[_at(line), left], rows[_at(line), right]):
-            i = _at(point)
-            lanes = _may_cover(edges, x[i], y[i], so_far[i])
-            found_at[_at(found)], found_lanes[_at(found)] = point, lanes
-            found += lanes != 0
+    for number in range(points):
+        point = point_at[_at(number)]
+        i = _at(point)
+        lanes = _may_cover(edges, x[i], y[i], so_far[i])
+        point_at[_at(found)], found_lanes[_at(found)] = point, lanes
+        found += lanes != 0
     return found
 
 
@@ -177,19 +221,28 @@ def pairs_of(
 
 
 @njit(error_model="numpy")
-def heights_on(
+def draw_pairs(
     seen: Float[np.ndarray, " 144"],
+    order: Int[np.ndarray, " v"],
     x: Float[np.ndarray, " v"],
     y: Float[np.ndarray, " v"],
     pair_at: Int[np.ndarray, " pairs"],
     pair_lane: Int[np.ndarray, " pairs"],
     pairs: int,
     top: float,
-    pair_z: Float[np.ndarray, " pairs"],
+    number: int,
+    height: Float[np.ndarray, " v"],
+    body: Int[np.ndarray, " v"],
+    so_far: Float[np.ndarray, " v"],
 ) -> None:
-    """Height of each pair's triangle at its point; -inf where it does not cover it below top."""
-    for number in range(pairs):
-        i, k = _at(pair_at[_at(number)]), _at(pair_lane[_at(number)])
+    """Height and body at each pair's point, where its triangle covers it below top and above what
+    is there.
+
+    One pair after the other: in SIMD lanes its eleven look-ups would be gathered, which takes
+    longer than all of its arithmetic.
+    """
+    for pair in range(pairs):
+        i, k = _at(pair_at[_at(pair)]), _at(pair_lane[_at(pair)])
         a_x, a_y = seen[k] - x[i], seen[LANES + k] - y[i]
         b_x, b_y = seen[3 * LANES + k] - x[i], seen[4 * LANES + k] - y[i]
         c_x, c_y = seen[6 * LANES + k] - x[i], seen[7 * LANES + k] - y[i]
@@ -199,4 +252,7 @@ def heights_on(
         z = (of_a * a_z + of_b * b_z + of_c * c_z) / whole
         z = min(max(z, min(min(a_z, b_z), c_z)), max(max(a_z, b_z), c_z))
         inside = (min(min(of_a, of_b), of_c) >= 0.0) | (max(max(of_a, of_b), of_c) <= 0.0)
-        pair_z[_at(number)] = z if inside & (whole != 0.0) & (z <= top) else -np.inf
+        point = _at(order[i])
+        if inside & (whole != 0.0) & (z <= top) & (z > height[point]):
+            height[point], so_far[i] = z, np.float32(z)
+            body[point] = number

@@ -15,10 +15,12 @@ from pipeline.compiled_code import njit
 from pipeline.world.covered_points import (
     SINGLE,
     around_block,
-    heights_on,
+    bound_triangles,
+    draw_pairs,
     near_points,
     pairs_of,
     place_triangles,
+    points_within,
 )
 from pipeline.world.point_cells import CELLS, PointCells, cells_of
 from pipeline.world.triangle_blocks import LANES, TriangleBlocks
@@ -111,7 +113,7 @@ def _arguments(
     """A body and the points as compiled code takes them."""
     blocks = posed.blocks
     return (
-        (blocks.corners_m, blocks.first, blocks.count, blocks.boxes_m),
+        (blocks.corners_m, blocks.near_m, blocks.first, blocks.count, blocks.boxes_m),
         (blocks.centre_m, blocks.extent_m, posed.body_id),
         np.ascontiguousarray(posed.world_from_body, dtype=np.float64),
         (cells.order, cells.x_m, cells.y_m, cells.near_x_m, cells.near_y_m),
@@ -159,7 +161,7 @@ def _draw(
     body_out: Int[np.ndarray, "n v"],
 ) -> None:
     """Draw one body onto the points of each frame, where it is higher than what is there."""
-    corners, first, count, boxes = tree
+    corners, near, first, count, boxes = tree
     centre, extent, number = whole
     order, x, y, near_x, near_y = points
     lower, per_m, rows, within, reach = grid
@@ -169,7 +171,8 @@ def _draw(
     cells = np.empty(4 * LANES, dtype=np.int32)
     low_high = np.empty(2 * LANES, dtype=np.float32)
     seen, edges = np.empty(9 * LANES), np.empty(10 * LANES, dtype=np.float32)
-    rectangle = np.empty(4 * LANES)
+    sides, near_turn = np.empty(5 * LANES, dtype=np.float32), np.empty(12, dtype=np.float32)
+    near_reach = np.float32(reach)
     so_far = np.empty(len(x), dtype=np.float32)
     found_at, found_lanes = (
         np.empty(len(x) + 1, dtype=np.int64),
@@ -179,14 +182,25 @@ def _draw(
         np.empty(LANES * len(x), dtype=np.int64),
         np.empty(LANES * len(x), dtype=np.int64),
     )
-    pair_z = np.empty(LANES * len(x))
     for row in range(len(frames)):
         turn = _frame_from_body(frames[row], pose)
         ready = False
         node_at[0], top_at[0] = len(first) - 1, np.inf
         cells_at[0, 0], cells_at[0, 1], cells_at[0, 2], cells_at[0, 3] = 0, CELLS, 0, CELLS
         waiting = 1
-        slack = SINGLE * (extent + reach + abs(top) + np.abs(turn[:, 3]).sum())
+        away = abs(turn[0, 3]) + abs(turn[1, 3]) + abs(turn[2, 3])
+        away += abs(centre[0]) + abs(centre[1]) + abs(centre[2])
+        slack = SINGLE * (extent + reach + abs(top) + away)
+        near_slack = np.float32(slack)
+        for axis in range(3):
+            for other in range(3):
+                near_turn[4 * axis + other] = turn[axis, other]
+            near_turn[4 * axis + 3] = (
+                turn[axis, 0] * centre[0]
+                + turn[axis, 1] * centre[1]
+                + turn[axis, 2] * centre[2]
+                + turn[axis, 3]
+            )
         height, body = height_out[row], body_out[row]
         while waiting > 0:
             waiting -= 1
@@ -217,17 +231,28 @@ def _draw(
                 for i in range(len(so_far)):
                     so_far[i] = np.float32(height[order[i]])
                 ready = True
-            place_triangles(corners[node], turn, reach, seen, edges, rectangle)
-            around_block(rectangle, edges, count[node], lower, per_m, cells)
-            found = near_points(edges, cells, rows, near_x, near_y, so_far, found_at, found_lanes)
+            bound_triangles(near[node], near_turn, near_reach, near_slack, edges, sides)
+            # Lanes without a triangle are points, which have no lines to be outside of.
+            for k in range(count[node], LANES):
+                edges[9 * LANES + k] = -np.inf
+            sifted = points_within(
+                around_block(sides, near_slack),
+                lower,
+                per_m,
+                rows,
+                near_x,
+                near_y,
+                so_far,
+                found_at,
+            )
+            found = near_points(edges, near_x, near_y, so_far, found_at, sifted, found_lanes)
+            if found == 0:
+                continue
+            place_triangles(corners[node], turn, seen)
             pairs = pairs_of(found_at, found_lanes, found, pair_at, pair_lane)
-            heights_on(seen, x, y, pair_at, pair_lane, pairs, top, pair_z)
-            for pair in range(pairs):
-                at, z = _at(pair_at[_at(pair)]), pair_z[_at(pair)]
-                point = _at(order[at])
-                if z > height[point]:
-                    height[point], so_far[at] = z, np.float32(z)
-                    body[point] = number
+            draw_pairs(
+                seen, order, x, y, pair_at, pair_lane, pairs, top, number, height, body, so_far
+            )
 
 
 @njit(error_model="numpy")

@@ -35,7 +35,9 @@ class TriangleBlocks:
     ----------
     corners_m
         Coordinates of the triangles of each block, shape (blocks, 144): 16 x, y, z of the first
-        corner, then of the second and third [m]; zeros where a block has fewer than 16.
+        corner, then of the second and third [m]; its first corner where a block has fewer than 16.
+    near_m
+        The same in single precision, relative to ``centre_m`` [m].
     face
         Number of each triangle before it was sorted, shape (m,).
     first
@@ -52,6 +54,7 @@ class TriangleBlocks:
     """
 
     corners_m: Float[np.ndarray, "blocks 144"]
+    near_m: Float[np.ndarray, "blocks 144"]
     face: Int[np.ndarray, " m"]
     first: Int[np.ndarray, " nodes"]
     count: Int[np.ndarray, " nodes"]
@@ -96,8 +99,11 @@ def build_blocks(corners_m: Float[np.ndarray, "m 3 3"]) -> TriangleBlocks:
     face = _sorted_by(keys)
     centre = (lower + upper) / 2
     blocks, first, count, boxes = _boxed(corners_m, face, centre)
+    by_axis = blocks.reshape(-1, 3, 3, LANES)
+    near = (by_axis - centre[:, None]).astype(np.float32)
     return TriangleBlocks(
         corners_m=read_only(blocks),
+        near_m=read_only(near.reshape(blocks.shape)),
         face=read_only(face),
         first=read_only(first),
         count=read_only(count),
@@ -241,7 +247,7 @@ def _boxed(
     while level > 1:
         level = (level + LANES - 1) // LANES
         nodes += level
-    corners_of = np.zeros((blocks, 9 * LANES))
+    corners_of = np.empty((blocks, 9 * LANES))
     first, count = np.empty(nodes, dtype=np.int64), np.empty(nodes, dtype=np.int64)
     lower, upper = np.full((nodes, 3), np.inf), np.full((nodes, 3), -np.inf)
     boxes = np.zeros((nodes - blocks, 6 * LANES), dtype=np.float32)
@@ -256,6 +262,12 @@ def _boxed(
                     corners_of[block, (3 * corner + axis) * LANES + lane] = value
                     lower[block, axis] = min(lower[block, axis], value)
                     upper[block, axis] = max(upper[block, axis], value)
+        # Lanes without a triangle have one without area, which covers nothing.
+        for lane in range(count[block], LANES):
+            for axis in range(3):
+                value = corners_of[block, axis * LANES]
+                for corner in range(3):
+                    corners_of[block, (3 * corner + axis) * LANES + lane] = value
     below, size, above = 0, blocks, blocks
     while size > 1:
         parents = (size + LANES - 1) // LANES

@@ -8,7 +8,7 @@ from pipeline.config.grasps import PadConfig
 from pipeline.geometry.mesh import Mesh
 from pipeline.gripper import pad_of
 from pipeline.labelling import heights
-from pipeline.labelling.heights import pad_heights, pad_heights_by_rays
+from pipeline.labelling.heights import pad_heights, pad_heights_by_rays, triangles_per_m2
 from pipeline.labelling.sampling import contact_frames
 from pipeline.world.raycasting import RayScene
 
@@ -45,3 +45,12 @@ def test_rays_are_cast_at_fine_meshes(monkeypatch: pytest.MonkeyPatch) -> None:
     found, _ = pad_heights(frames, scene, pad, CLEARANCE_M)
     cast, _ = pad_heights_by_rays(frames, scene, pad, CLEARANCE_M)
     assert found.tobytes() == cast.tobytes()
+
+
+def test_bodies_count_alike_and_a_table_does_not() -> None:
+    balls = [trimesh.creation.icosphere(subdivisions, 0.05) for subdivisions in (3, 4)]
+    table = trimesh.creation.box((1.0, 1.0, 0.01))
+    meshes = [Mesh(np.asarray(m.vertices), np.asarray(m.faces)) for m in (*balls, table)]
+    each = [len(ball.faces) / ball.area for ball in balls]
+    assert triangles_per_m2(meshes) == pytest.approx(np.mean(each))
+    assert triangles_per_m2(meshes[2:]) == 0.0
