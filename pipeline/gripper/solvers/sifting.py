@@ -16,7 +16,8 @@ with h = M'pi + nu 1. Four ways out, the cheapest first:
    their bounds, v = -sign h. `interior_point` solves for the few, and the duality gap over all
    triangles, at its multipliers, certifies the whole.
 
-A problem that none of them decides goes to `interior_point` with all its triangles.
+A problem that none of them decides goes to `interior_point` with all its triangles. Ways 2 and 3
+stand in `newton`, the certificate of way 4 in `certificate`.
 """
 
 import numpy as np
