@@ -75,7 +75,7 @@ def clutter_jobs(
 
 
 def contacts_jobs(stage: StageContext, scenes: Sequence[ClutterScene]) -> list[ContactsJob]:
-    """Some clutters a level of the evaluated and of the seen families, equally far apart.
+    """Contacts in some clutters of each level, of the evaluated split and of families seen before.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def contacts_jobs(stage: StageContext, scenes: Sequence[ClutterScene]) -> list[C
 
     Returns
     -------
-    A job for each of the chosen clutters.
+    A job for each of those clutters, which lie equally far apart in their order.
     """
     wanted = stage.config.evaluate
     by_group: dict[tuple[str, int], list[int]] = {}
@@ -120,7 +120,7 @@ def shared_of(stage: StageContext) -> dict[str, Any]:
 
 
 def work(job: ClutterJob | ContactsJob) -> Path:
-    """Make, or keep, what comes of one clutter."""
+    """Do one work item, unless its file is there already."""
     if not is_current(job.path, job.provenance.key):
         topic, messages = (
             ("/attempts", attempts_at(job, job.policy))

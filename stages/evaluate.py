@@ -30,7 +30,7 @@ from stages.graph import EVALUATE, RUNS_DIR, inputs_of
 
 
 def build(stage: StageContext) -> Summary:
-    """Pick the clutters of a split empty in closed loop; success is judged by physics."""
+    """Empty the clutters of a split in closed loop, grasp by grasp; physics judges success."""
     every_scene = read_unseen_scenes(stage.upstream("scenes"))
     scenes = clutters(stage, every_scene)
     wanted = stage.config.evaluate

@@ -78,7 +78,7 @@ def support_beside_masks(
 
 
 def upright(frame: Frame) -> Float[np.ndarray, "4 4"]:
-    """A frame of the world for a scene without a support: z up, below all that was measured."""
+    """For a scene without a support: a frame of the world, z up, below all that was measured."""
     points, _, _ = points_of_depth(frame.depth_m, frame.camera, EVERY_PX)
     up = WORLD_UP if frame.posed else UP_IN_CAMERA
     lowest = float((points @ up).min()) - 1.0
@@ -88,10 +88,10 @@ def upright(frame: Frame) -> Float[np.ndarray, "4 4"]:
 def frames_that_agree(
     frames: Sequence[Frame], config: RunConfig, rng: np.random.Generator
 ) -> list[Frame]:
-    """Frames whose poses fit together, by the support that each sees alone; others with a warning.
+    """Frames whose poses fit together, by the support that each shows; others are warned of.
 
     Merged frames whose poses do not fit show every surface twice, and what is a floor in one of
-    them stands out of the floor of the other.
+    them seems to stand on the floor of the other.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ def frames_that_agree(
 
     Returns
     -------
-    The frames to merge. A frame that shows no support, or has no pose, cannot be told and is kept.
+    The frames to merge. One that shows no support, or has no pose, cannot be judged and is kept.
     """
     known = all(frame.posed for frame in frames) and config.predict.support.height_m is None
     if len(frames) == 1 or not known:

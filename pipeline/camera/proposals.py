@@ -1,7 +1,8 @@
-"""Ranked grasps of real frames: contacts on what may be grasped, their q-hat, the best apart.
+"""Ranked grasps of real frames: contacts on what may be grasped, with q-hat, the best ones apart.
 
-The same pieces as in simulation: contacts along the mean surface normal (`pipeline.control`), sub
-clouds of all pictures together (`pipeline.sensing`), q-hat by a network or by another ranking.
+They are made by the same functions as in simulation: contacts along the mean surface normal
+(`pipeline.control`), sub clouds of all pictures together (`pipeline.sensing`), and q-hat by a
+network or by another ranking.
 """
 
 from collections import Counter

@@ -1,6 +1,7 @@
 """What objects stand on, and the walls around them: table, or bin floor and bin walls.
 
-`support_search` finds it in what was measured; here is what it then tells of a point.
+`support_search` finds the support in what was measured; this module says of points whether they
+belong to the support or stand on it.
 """
 
 from dataclasses import dataclass
@@ -49,7 +50,7 @@ class Support:
 
 
 def level_support(height_m: float) -> Support:
-    """A support at a known height of a world whose z is up, without an edge."""
+    """A support without an edge, at a known height [m] of a world whose z is up."""
     pose = np.eye(4)
     pose[2, 3] = height_m
     return Support(pose, 0.0, (), np.empty((0, 2)))
@@ -61,7 +62,7 @@ def stands_out(
     eyes_m: Float[np.ndarray, "n 3"],
     config: PredictConfig,
 ) -> Bool[np.ndarray, " n"]:
-    """Whether points belong to what stands on the support: off floor, walls and their rounding.
+    """Whether points belong to what stands on the support, and not to floor, walls or rounding.
 
     Parameters
     ----------
@@ -149,10 +150,11 @@ def _on_rounding(
     least_m: Float[np.ndarray, " n"],
     config: SupportConfig,
 ) -> Bool[np.ndarray, " n"]:
-    """Whether points may belong to the rounding with which a bin's floor passes into its walls.
+    """Whether points may belong to the rounding between a bin's floor and its walls.
 
-    A ball of the rounding's radius that rolls in the bin stays a radius away from floor and walls.
-    What it cannot touch lies more than a radius from all places that its centre can be in.
+    Think of a ball of the rounding's radius that rolls in the bin: its centre stays a radius away
+    from floor and walls. A point that the ball cannot touch may belong to the rounding: it lies
+    more than a radius from all places where the centre can be.
 
     Parameters
     ----------
@@ -191,7 +193,7 @@ def _on_rounding(
 def _to_corner(
     first_m: Float[np.ndarray, " n"], second_m: Float[np.ndarray, " n"], turn: float
 ) -> Float[np.ndarray, " n"]:
-    """Distance to the wedge between two planes, where both are lacking [m].
+    """Distance to the wedge between two planes, for points that lie outside both [m].
 
     Parameters
     ----------

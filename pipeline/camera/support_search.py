@@ -1,8 +1,8 @@
-"""Finds the support in what was measured.
+"""The search for the support in what was measured.
 
 The support is the largest plane that lies under nearly all that was measured and whose normal
-points up. Where no pose says which way is up, up is taken as in any picture of a camera that is
-held upright and looks ahead or down: towards the picture's upper edge and towards the camera.
+points up. Where no pose says which way is up, the camera is taken to be held upright and to look
+ahead or down: up is then towards the picture's upper edge and towards the camera.
 """
 
 import numpy as np
@@ -127,7 +127,7 @@ def _parallel(
     distance_m: Float[np.ndarray, " n"],
     config: SupportConfig,
 ) -> list[Plane]:
-    """Planes parallel to one, at lower heights at which many points lie."""
+    """Planes parallel to the given one and below it, at heights where many points lie."""
     height_m = plane.height_m(points_m)
     near_m = config.tolerance * float(np.median(distance_m))
     lowest = float(np.percentile(height_m, 100 * config.below_max_share / 2))
@@ -144,7 +144,7 @@ def _looked_at(
     eyes_m: Float[np.ndarray, "n 3"],
     ahead: Float[np.ndarray, "n 3"],
 ) -> Float[np.ndarray, " 2"]:
-    """Where on the support the cameras look, in its own x and y: the mean over their pictures."""
+    """The place on the support that the cameras look at, in its x and y; their mean."""
     eye = transform_points(to_support, eyes_m)
     direction = rotate_vectors(to_support, ahead)
     down = direction[:, 2] < -_LEAST_DESCENT
@@ -192,7 +192,7 @@ def _walls(
 
 
 def _extent(along_m: Float[np.ndarray, " n"]) -> float:
-    """Length over which points lie along a line, without the outermost twentieth a side [m]."""
+    """Length of a line over which points lie, without the outermost 5 % at each end [m]."""
     return float(np.ptp(np.percentile(along_m, [5, 95]))) if len(along_m) else 0.0
 
 

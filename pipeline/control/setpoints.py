@@ -23,19 +23,22 @@ class Way:
 
     Attributes
     ----------
+    first
+        Where it begins, world_from_gripper or any other pose, shape (4, 4).
     shift_m
         From the first origin to the second, shape (3,), WCS [m].
     turn_rad
         Rotation vector from the first orientation to the second, shape (3,), WCS [rad].
     """
 
+    first: Float[np.ndarray, "4 4"]
     shift_m: Float[np.ndarray, " 3"]
     turn_rad: Float[np.ndarray, " 3"]
 
     @classmethod
     def between(cls, first: Float[np.ndarray, "4 4"], second: Float[np.ndarray, "4 4"]) -> Self:
         """The way from one pose to another."""
-        return cls(second[:3, 3] - first[:3, 3], turn_between(first, second))
+        return cls(first, second[:3, 3] - first[:3, 3], turn_between(first, second))
 
     @property
     def length_m(self) -> float:
@@ -49,9 +52,9 @@ class Way:
         shift_m, turn_rad = np.linalg.norm(self.shift_m), np.linalg.norm(self.turn_rad)
         return float(shift_m) <= ARRIVED_M and float(turn_rad) <= ARRIVED_RAD
 
-    def gone(self, first: Float[np.ndarray, "4 4"], share: float) -> Float[np.ndarray, "4 4"]:
-        """The pose at a share of the way from its first pose: at 0 that pose, at 1 the second."""
-        pose = turned(first, share * self.turn_rad)
+    def at(self, share: float) -> Float[np.ndarray, "4 4"]:
+        """The pose at a share of the way: at 0 the first, at 1 the second."""
+        pose = turned(self.first, share * self.turn_rad)
         pose[:3, 3] += share * self.shift_m
         return np.asarray(pose)
 

@@ -1,7 +1,7 @@
 """The film of air under the pad, compiled: what `leak.leak` says, ten times as fast.
 
-Conjugate gradients with an incomplete Cholesky factor, started from what the last step found. Tests
-hold it to the plain way.
+It is solved by conjugate gradients with an incomplete Cholesky factor, and each step starts from
+what the last one found. Tests hold it to the plain way.
 """
 
 import numpy as np
@@ -153,7 +153,7 @@ def _film_solved(
     right: Float[np.ndarray, " n"],
     shares: Float[np.ndarray, " n"],
 ) -> None:
-    """Conjugate gradients from where ``shares`` is; vertices that are out stay at zero."""
+    """Conjugate gradients, starting at ``shares``; vertices that are out stay at zero."""
     n = len(diagonal)
     rest, step, image, better = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     largest = 0.0

@@ -83,7 +83,7 @@ class DrivenRobot:
         self._state = state
 
     def think(self) -> None:
-        """Nothing is done: the time that ranking takes has passed by itself."""
+        """Do nothing: on a real arm the time that ranking takes has passed already."""
 
     def pose(self) -> Float[np.ndarray, "4 4"]:
         """Measured world_from_gripper."""
@@ -151,13 +151,14 @@ class DrivenRobot:
         return self._rest(start, transport.rest_s)
 
     def _play(self, goal: Float[np.ndarray, "4 4"], number: int) -> None:
-        """One setpoint of a motion that is played as it is; a sample a control period."""
+        """Give one setpoint of a planned motion; take a sample once in a control period."""
         self._goal = goal
         self._driver.move(self._flange_at(goal))
         if number % self._steps == 0:
             self._sample(self._wrench())
 
     def _rest(self, goal: Float[np.ndarray, "4 4"], time_s: float) -> Reading:
+        """Stay at a setpoint for a time [s]; the wrench is the mean of the last period."""
         felt = []
         for number in range(1, max(round(time_s / self._driver.period_s), self._steps) + 1):
             self._play(goal, number)
@@ -165,7 +166,7 @@ class DrivenRobot:
         return self._reading(np.mean(felt[-self._steps :], axis=0), 0.0, True, followed=True)
 
     def _go(self, pose: Float[np.ndarray, "4 4"]) -> None:
-        """Travel to a pose, and refuse to go on where the arm does not get there."""
+        """Travel to a pose. Raises CalibrationError where the arm stops on the way."""
         while not self._at(pose):
             self._advance(pose, self._policy.travel_m_s)
             moved = self._driver.move(self._flange_at(self._goal))
@@ -186,7 +187,7 @@ class DrivenRobot:
         self._waited = 0
         acceleration, dt = self._policy.acceleration_m_s2, self._driver.period_s
         self._speed_m_s = next_speed_m_s(self._speed_m_s, speed_m_s, left_m, acceleration, dt)
-        self._goal = way.gone(self._goal, min(self._speed_m_s * dt / left_m, 1.0))
+        self._goal = way.at(min(self._speed_m_s * dt / left_m, 1.0))
 
     def tare(self) -> None:
         """Take the mean of what the empty, resting hand reads as the bias.
@@ -213,7 +214,7 @@ class DrivenRobot:
                 )
 
     def _wrench(self) -> Float[np.ndarray, " 6"]:
-        """What the world exerts on the flange beside the hand's weight, in the axes of GCS."""
+        """What the world exerts on the flange, without the hand's own weight; axes of GCS."""
         felt = self._driver.wrench() - self._bias - self._hand_weight()
         into_gripper = self._calibration.flange_from_gripper[:3, :3].T
         return np.concatenate([into_gripper @ felt[:3], into_gripper @ felt[3:]])

@@ -7,7 +7,7 @@ touches the true surfaces.
 
 import math
 from bisect import bisect_left
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import sapien
@@ -26,11 +26,7 @@ from pipeline.physics.engine import Body
 from pipeline.simulation.floating import Mover
 from pipeline.simulation.imperfection import WrenchSensor
 from pipeline.simulation.judges import build_judge
-from pipeline.simulation.payload import (
-    GRAVITY_M_S2,
-    loads_of_a_kilogram,
-    weight_borne_n,
-)
+from pipeline.simulation.payload import GRAVITY_M_S2, loads_of_a_kilogram, weight_borne_n
 from pipeline.simulation.suction_joint import SuctionJoint
 from pipeline.simulation.wrenches import at_flange, push_on
 from pipeline.world.posed_bodies import PosedBodies, PosedScene
@@ -102,7 +98,7 @@ class SuctionGripper:
         self._sample(np.zeros(6))
 
     def enter(self, state: State) -> None:
-        """Store the policy's state for the recorded samples."""
+        """Note the policy's state: samples taken from now on carry it."""
         self._state = state
 
     def pose(self) -> Float[np.ndarray, "4 4"]:
@@ -148,14 +144,9 @@ class SuctionGripper:
         a, b = self.samples[max(after - 1, 0)], self.samples[after]
         span_s = b.time_s - a.time_s
         share = min(max((self.time_s - age_s - a.time_s) / span_s, 0.0), 1.0) if span_s else 1.0
-
-        def then(
-            first: Float[np.ndarray, "4 4"], second: Float[np.ndarray, "4 4"]
-        ) -> Float[np.ndarray, "4 4"]:
-            return Way.between(first, second).gone(first, share)
-
-        return then(a.world_from_gripper, b.world_from_gripper), {
-            i: then(a.world_from_object[i], b.world_from_object[i]) for i in self._bodies
+        return Way.between(a.world_from_gripper, b.world_from_gripper).at(share), {
+            i: Way.between(a.world_from_object[i], b.world_from_object[i]).at(share)
+            for i in self._bodies
         }
 
     def reachable(self, world_from_gripper: Float[np.ndarray, "4 4"]) -> bool:
@@ -227,44 +218,45 @@ class SuctionGripper:
 
         The wrench returned is the mean over the last control period.
         """
-        lift = self._config.evaluate.lift
-        centre = self._goal.copy()
-        for number in range(1, round(lift.shake_s / self._world.timestep) + 1):
-            phase = 2 * np.pi * lift.shake_hz * number * self._world.timestep
-            self._goal = centre.copy()
-            self._goal[0, 3] += lift.shake_m * np.sin(phase)
-            load, _ = self._physics_step()
-            if number % self._steps == 0:
-                self._sample(self._felt(load, self._error()))
-        self._goal, loads = centre, []
-        for number in range(1, round(lift.hold_s / self._world.timestep) + 1):
-            loads.append(self._physics_step()[0])
-            if number % self._steps == 0:
-                self._sample(self._felt(loads[-1], self._error()))
-        return self._reading(
-            np.mean(loads[-self._steps :], axis=0), np.zeros(3), True, touched=False
-        )
+        lift, dt = self._config.evaluate.lift, self._world.timestep
+        centre, shaken = self._goal.copy(), []
+        for number in range(1, round(lift.shake_s / dt) + 1):
+            phase = 2 * np.pi * lift.shake_hz * number * dt
+            shaken.append(centre.copy())
+            shaken[-1][0, 3] += lift.shake_m * np.sin(phase)
+        self._play(shaken)
+        return self._at_rest(self._play([centre] * round(lift.hold_s / dt)))
 
     def carry(self, acceleration_m_s2: float) -> Reading:
-        """Aside and back at an acceleration, braking as hard; the wrench is the mean while still.
+        """Move aside and back at an acceleration, braking as hard, then hold still.
 
-        The way is towards the table's middle, or wherever else the mover can go.
+        The way is towards the table's middle, or wherever else the mover can go. The wrench
+        returned is the mean over the last control period.
         """
         transport, dt = self._config.evaluate.transport, self._world.timestep
         start = self._goal.copy()
         aside_m = way_aside_m(start, transport.way_m, self.reachable)
         leg_s = 2 * math.sqrt(max(float(np.linalg.norm(aside_m)), ARRIVED_M) / acceleration_m_s2)
         moving, resting = math.ceil(2 * leg_s / dt), math.ceil(transport.rest_s / dt)
+        carried = [start.copy() for _ in range(moving + resting)]
+        for number, pose in enumerate(carried, start=1):
+            pose[:3, 3] += there_and_back(number * dt / leg_s) * aside_m
+        return self._at_rest(self._play(carried))
+
+    def _play(self, poses: Sequence[Float[np.ndarray, "4 4"]]) -> list[Float[np.ndarray, " 6"]]:
+        """Command a pose at each step of physics; the load on the pad at each."""
         loads = []
-        for number in range(1, moving + resting + 1):
-            self._goal = start.copy()
-            self._goal[:3, 3] += there_and_back(number * dt / leg_s) * aside_m
+        for number, pose in enumerate(poses, start=1):
+            self._goal = pose
             loads.append(self._physics_step()[0])
             if number % self._steps == 0:
                 self._sample(self._felt(loads[-1], self._error()))
-        return self._reading(
-            np.mean(loads[-self._steps :], axis=0), np.zeros(3), True, touched=False
-        )
+        return loads
+
+    def _at_rest(self, loads: list[Float[np.ndarray, " 6"]]) -> Reading:
+        """What the robot reports after a motion that ended at rest."""
+        last = np.mean(loads[-self._steps :], axis=0)
+        return self._reading(last, np.zeros(3), arrived=True, touched=False)
 
     def lifted_m(self) -> float:
         """Height of the held object above where it was sealed [m]; 0 where none is held."""
@@ -326,7 +318,7 @@ class SuctionGripper:
             return
         acceleration, dt = self._config.evaluate.policy.acceleration_m_s2, self._world.timestep
         self._speed_m_s = next_speed_m_s(self._speed_m_s, speed_m_s, left_m, acceleration, dt)
-        self._goal = way.gone(self._goal, min(self._speed_m_s * dt / left_m, 1.0))
+        self._goal = way.at(min(self._speed_m_s * dt / left_m, 1.0))
 
     def _physics_step(self) -> tuple[Float[np.ndarray, " 6"], Float[np.ndarray, " 3"]]:
         """Step the world once; load on the pad, and force on the rigid parts [N], both in GCS."""
@@ -352,8 +344,8 @@ class SuctionGripper:
     def _convey(self) -> None:
         """Give every body that is not held the conveyor's speed.
 
-        The table stands still and brakes by friction in the step of physics that follows; what that
-        takes is given beside the speed.
+        The table stands still, and its friction brakes the bodies in the step of physics that
+        follows. They are given what that takes in addition.
         """
         if self.conveyor_m_s == 0.0:
             return

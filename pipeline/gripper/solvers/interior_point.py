@@ -124,7 +124,7 @@ def _interior_point(
     n: int,
     multipliers: Float[np.ndarray, " 5"],
 ) -> tuple[int, int]:
-    """Status and iterations; v is left in work[0], pi and nu in `multipliers`."""
+    """Status and iterations; v is left in work[V], pi and nu in `multipliers`."""
     # Slices of exactly n elements let loops run without bounds on strides.
     m_0, m_1, m_2, m_3 = rows[0, :n], rows[1, :n], rows[2, :n], rows[3, :n]
     v, z_l, z_u, h = work[V, :n], work[Z_L, :n], work[Z_U, :n], work[H, :n]

@@ -54,8 +54,8 @@ def nearest_reached(
 ) -> bool:
     """Whether the point nearest to Lambda is reached, by the least-squares v within its bounds.
 
-    v = -(M'x + nu 1) cut off at its bounds; Newton's method finds the x of the point, and is given
-    up where it gets no nearer.
+    v = -(M'x + nu 1) cut off at its bounds. Newton's method looks for the x of the point, and gives
+    up where it comes no nearer.
     """
     wanted = np.empty(5)
     right = np.empty(5)
@@ -112,7 +112,7 @@ def rounded_off(
     v: Float[np.ndarray, " n"],
     h: Float[np.ndarray, " n"],
 ) -> tuple[int, int, float]:
-    """Status, passes, and the |h| within which triangles are left open where it is SIFTED."""
+    """The status, how many passes were made, and the |h| within which triangles stay open."""
     n = v.size
     x = np.zeros(5)
     change = np.empty(5)

@@ -1,4 +1,4 @@
-"""Most quality QPs by a few passes over the triangles: a certificate, or few triangles left.
+"""Decides most quality QPs by a few passes over the triangles, or leaves few triangles open.
 
 In the numbers of `structured`, the dual of the problem is to minimise over pi and nu
 
@@ -12,11 +12,12 @@ with h = M'pi + nu 1. Four ways out, the cheapest first:
 3. Newton's method on the dual with |h| rounded off to h^2 / (2 eps) + eps / 2 within eps, which
    is smaller at each pass. v is then -h / eps, cut off at its bounds. Where no v meets the
    limits, the dual falls without end, and pi ends as a certificate of Farkas' lemma.
-4. When eps is so small that few triangles are within a few eps of h = 0, all others are taken
-   for bang-bang, v = -sign h. `interior_point` solves for the few, and the duality gap over all
+4. When eps is so small that few triangles are within a few eps of h = 0, all others are put at
+   their bounds, v = -sign h. `interior_point` solves for the few, and the duality gap over all
    triangles, at its multipliers, certifies the whole.
 
-What none of them decides is left to `interior_point` with all its triangles.
+A problem that none of them decides goes to `interior_point` with all its triangles. Ways 2 and 3
+stand in `newton`, the certificate of way 4 in `certificate`.
 """
 
 import numpy as np

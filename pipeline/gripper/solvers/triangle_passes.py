@@ -25,7 +25,7 @@ def move(
     nu: float,
     alpha: float,
 ) -> tuple[float, float, float, float, float, float, float, float]:
-    """A step of length alpha; then h = M'pi + nu 1 and the inverses of the slacks there.
+    """Go a step of length alpha, and take h = M'pi + nu 1 and the inverses of the slacks there.
 
     Returns the sum of z times slack, the sum of |h - z_l + z_u|, that of |h|, 1'v and M v.
     """
@@ -206,9 +206,10 @@ def step_along(
 
 @compiled_finite
 def _greatest(values: Float[np.ndarray, " n"]) -> float:
-    """Greatest of the values, which are overwritten: halves against each other, in SIMD lanes.
+    """The greatest of the values, which are overwritten.
 
-    The compiler does not vectorise a running maximum.
+    Half of them is compared with the other half, again and again: the compiler puts that into SIMD
+    lanes, and a running maximum it does not.
     """
     count = values.size
     while count > 1:
