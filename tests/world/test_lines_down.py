@@ -180,7 +180,8 @@ def decided_one_by_one(mesh: Mesh, frame: np.ndarray) -> np.ndarray:
         height = np.clip(height, seen[2].min(axis=0), seen[2].max(axis=0))
         inside = ((of >= 0.0).all(axis=0) | (of <= 0.0).all(axis=0)) & (whole != 0.0)
         heights[number] = height[inside & (height <= TOP_M)].max(initial=-np.inf)
-    length = np.sqrt(frame[0, 2] ** 2 + frame[1, 2] ** 2 + frame[2, 2] ** 2)
+    x, y, z = frame[:3, 2]
+    length = np.sqrt(x * x + y * y + z * z)  # a power rounds otherwise
     return np.asarray(TOP_M - (TOP_M - heights) * length)
 
 
