@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from pipeline.geometry.mesh import Mesh
+from pipeline.world import lines_down
 from pipeline.world.lines_down import PosedBlocks, follow_lines
 from pipeline.world.raycasting import RayScene
 from pipeline.world.triangle_blocks import blocks_of, mean_area_m2
@@ -162,3 +163,39 @@ def test_heights_on_scanned_meshes_are_those_of_rays() -> None:
     for path in sorted(Path(folder).glob("*.ply"))[:12:4]:
         mesh = mesh_of(trimesh.load(path, force="mesh"))
         assert_as_rays(RayScene([mesh]), frames_on(mesh, 40, 7))
+
+
+def decided_one_by_one(mesh: Mesh, frame: np.ndarray) -> np.ndarray:
+    """Heights by the decision in double precision on every pair of point and triangle."""
+    turn = lines_down._frame_from_body(frame, np.eye(4))
+    x, y, z = mesh.vertices_m[mesh.faces].transpose(2, 1, 0)
+    seen = [row[0] * x + row[1] * y + row[2] * z + row[3] for row in turn]
+    heights = np.full(len(POINTS), -np.inf)
+    for number, point in enumerate(POINTS):
+        (a_x, b_x, c_x), (a_y, b_y, c_y) = seen[0] - point[0], seen[1] - point[1]
+        of = np.array([b_x * c_y - b_y * c_x, c_x * a_y - c_y * a_x, a_x * b_y - a_y * b_x])
+        whole = of[0] + of[1] + of[2]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            height = (of[0] * seen[2][0] + of[1] * seen[2][1] + of[2] * seen[2][2]) / whole
+        height = np.clip(height, seen[2].min(axis=0), seen[2].max(axis=0))
+        inside = ((of >= 0.0).all(axis=0) | (of <= 0.0).all(axis=0)) & (whole != 0.0)
+        heights[number] = height[inside & (height <= TOP_M)].max(initial=-np.inf)
+    x, y, z = frame[:3, 2]
+    length = np.sqrt(x * x + y * y + z * z)  # a power rounds otherwise
+    return np.asarray(TOP_M - (TOP_M - heights) * length)
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(-4.0, 0.0), st.floats(0.0, 2.0))
+@settings(max_examples=30, deadline=None)
+def test_bounds_leave_no_pair_out(seed: int, thinness: float, away_m: float) -> None:
+    """Slivers and specks, far from the mesh's origin too: the bytes of all pairs decided."""
+    rng = np.random.default_rng(seed)
+    middles = rng.uniform(-0.03, 0.03, (200, 1, 3)) + away_m
+    corners = middles + rng.normal(0, 0.01, (200, 3, 3)) * 10.0 ** rng.uniform(
+        thinness, 0.0, (200, 1, 3)
+    )
+    mesh = Mesh(corners.reshape(-1, 3), np.arange(600).reshape(200, 3))
+    frames = frames_on(mesh, 2, seed)
+    heights, _ = drawn(RayScene([mesh]), frames)
+    for frame, height in zip(frames, heights, strict=True):
+        assert height.tobytes() == decided_one_by_one(mesh, frame).tobytes()
