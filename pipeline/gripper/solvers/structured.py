@@ -19,7 +19,7 @@ which also leaves an interior to problems whose F_z cannot vary at all.
 
 `sifting` decides a problem or leaves few of its triangles open; `interior_point` solves for the
 few, and `certificate` says whether that is optimal for all. What is not decided so,
-`interior_point` solves with all triangles.
+`interior_point` solves with all triangles, which `whole_problems` writes side by side.
 """
 
 import numpy as np
@@ -30,6 +30,7 @@ from pipeline.gripper.solvers import interior_point
 from pipeline.gripper.solvers.certificate import certify_into
 from pipeline.gripper.solvers.newton import ROOM, SIFTED, UNDECIDED
 from pipeline.gripper.solvers.sifting import sift_into
+from pipeline.gripper.solvers.whole_problems import form_into, write_into
 
 
 def solve(problem: QualityProblem) -> QpSolution:
@@ -160,25 +161,28 @@ def solve_into(
         status,
         iterations,
     )
-    for i in np.flatnonzero(status == UNDECIDED).tolist():
-        of_all = wrench_matrices[i : i + 1, :, : counts[i]] / forces[i]
-        one = slice(i, i + 1)
-        v, zero = np.empty((1, counts[i])), np.zeros(1)
-        interior_point.solve_into(
-            spread * (of_all - of_all.mean(axis=2, keepdims=True)),
-            counts[one],
-            of_all.sum(axis=2),
-            zero,
-            bounded[one],
-            forces[one],
-            *setting,
-            max_iterations,
-            np.ones(1, dtype=np.bool_),
-            v,
-            multipliers[one],
-            status[one],
-            iterations[one],
-        )
-        weights[i, : counts[i]] = 1.0
-        if status[i] != GraspStatus.INFEASIBLE:
-            weights[i, : counts[i]] += spread * v[0]
+    whole = np.flatnonzero(status == UNDECIDED)
+    if len(whole) == 0:
+        return
+    most = int(counts[whole].max())
+    rows, centres = np.empty((len(whole), 4, most)), np.empty((len(whole), 4))
+    form_into(wrench_matrices, counts, forces, spread, whole, rows, centres)
+    found, multipliers = np.empty((len(whole), most)), np.empty((len(whole), 5))
+    verdict, steps = np.zeros(len(whole), dtype=np.int64), np.zeros(len(whole), dtype=np.int64)
+    interior_point.solve_into(
+        rows,
+        counts[whole],
+        centres,
+        np.zeros(len(whole)),
+        bounded[whole],
+        forces[whole],
+        *setting,
+        max_iterations,
+        np.ones(len(whole), dtype=np.bool_),
+        found,
+        multipliers,
+        verdict,
+        steps,
+    )
+    status[whole], iterations[whole] = verdict, steps
+    write_into(whole, counts, spread, found, status, weights)
