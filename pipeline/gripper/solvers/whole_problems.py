@@ -39,7 +39,7 @@ def pairwise_sum(values: Float[np.ndarray, " n"]) -> float:
         return total
     half = n // 2
     half -= half % _LANES
-    return pairwise_sum(values[:half]) + pairwise_sum(values[half:])
+    return float(pairwise_sum(values[:half]) + pairwise_sum(values[half:]))
 
 
 @compiled
