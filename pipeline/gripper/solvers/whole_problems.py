@@ -23,7 +23,7 @@ def pairwise_sum(values: Float[np.ndarray, " n"]) -> float:
         total = 0.0
         for i in range(n):
             total += values[i]
-        return total
+        return float(total)
     if n <= _BLOCK:
         lanes = np.empty(_LANES)
         for k in range(_LANES):
@@ -36,10 +36,10 @@ def pairwise_sum(values: Float[np.ndarray, " n"]) -> float:
         total = left + ((lanes[4] + lanes[5]) + (lanes[6] + lanes[7]))
         for i in range(whole, n):
             total += values[i]
-        return total
+        return float(total)
     half = n // 2
     half -= half % _LANES
-    return float(pairwise_sum(values[:half]) + pairwise_sum(values[half:]))
+    return pairwise_sum(values[:half]) + pairwise_sum(values[half:])
 
 
 @compiled
