@@ -70,6 +70,22 @@ REDUCED = {
         ".venv/bin/python -m pipeline.benchmarks.memory_picture --help",
         "it draws what the command before it writes; tests/benchmarks/test_watching.py draws",
     ),
+    ".venv/bin/python -m pipeline.benchmarks.steps runs/duel level6-test-00": (
+        ".venv/bin/python -c 'import pipeline.benchmarks.steps'",
+        "minutes, on a run of an hour; tests/benchmarks/test_steps.py adds up a profile",
+    ),
+    ".venv/bin/python -m pipeline.benchmarks.mesh_size": (
+        ".venv/bin/python -c 'import pipeline.benchmarks.mesh_size'",
+        "a minute of measuring; tests/benchmarks/test_mesh_size.py measures small meshes",
+    ),
+    ".venv/bin/python -m pipeline.benchmarks.mesh_size runs/duel level6-test-00": (
+        ".venv/bin/python -c 'import pipeline.benchmarks.mesh_size'",
+        "minutes, on a run of an hour; tests/benchmarks/test_mesh_size.py measures small meshes",
+    ),
+    ".venv/bin/python -m pipeline.benchmarks.mesh_size runs/bench level1-train-00": (
+        ".venv/bin/python -c 'import pipeline.benchmarks.mesh_size'",
+        "minutes, on run bench; tests/benchmarks/test_mesh_size.py measures small meshes",
+    ),
     "make calibrate RUN=ci": (
         "make -n calibrate RUN=ci",
         "the tiny run has too few samples; tests/stages/test_calibrate.py runs it",
