@@ -83,8 +83,8 @@ def build(stage: StageContext) -> Summary:
     publish_bytes(settled_in, plan.settled.to_json().encode())
     for remark in plan.remarks:
         logger.warning("{}", remark)
-    provenance = stage.provenance(left_out.cut_short)
-    write_objects(stage.output, provenance, objects, split, left_out.refused)
+    made_by = stage.provenance(left_out.cut_short)
+    write_objects(stage.output, made_by, objects, split, left_out.refused)
     figures = {"stretched_near_held_out": near, "solids_near_held_out": solids_near, **plan.figures}
     taken_over = sum(item.key in former for item in objects[: len(objects) - len(stretched)])
     figures |= {"taken_over": taken_over, "made": len(objects) - taken_over}
@@ -104,12 +104,11 @@ def declared_families(stage: StageContext) -> tuple[DeclaredFamily, ...]:
 
 def sources(stage: StageContext) -> tuple[list[Source], frozenset[str]]:
     """Every source, and the names of the embedded ones that meshes are trained beside."""
-    paths = [path for name, path in stage.inputs.items() if name.startswith("meshes/")]
     config = stage.config.objects
+    paths = [path for name, path in stage.inputs.items() if name.startswith("meshes/")]
     found, added = all_sources(paths, stage.mesh_dir, config.embedded_in_training)
-    if stage.works_from_store:
-        found = with_all_files(found, stage.mesh_dir, config)
-    return found, added
+    named = with_all_files(found, stage.mesh_dir, config) if stage.works_from_store else found
+    return named, added
 
 
 def measure(

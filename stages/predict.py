@@ -111,8 +111,7 @@ def predict(
     quality_min = config.predict.quality_min
     prediction = Prediction(frames, proposals, source.name, radius_m, quality_min)
     folder = out or RUNS_DIR / run / "predict" / frames[0].name
-    read = [path for item in files for path in paths_of(item)]
-    read += [path for path in (workspace,) if path is not None]
+    read = [path for item in files for path in paths_of(item)] + ([workspace] if workspace else [])
     publish(prediction, folder, provenance(config, read, source.digest))
     logger.info("{}", prediction.verdict)
     for reason, number in proposals.left_out.items():

@@ -41,7 +41,7 @@ def pause(seconds: float) -> float:
     return seconds
 
 
-def table(count: int = 1000) -> str:
+def table(count: int) -> str:
     """Items that do nothing and items of 20 ms, alone and shared, as Markdown."""
     rows = ["| an item takes | in a task of its own | shared |", "|-|-|-|"]
     for pause_s in (0.0, 0.02):

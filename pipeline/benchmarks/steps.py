@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from pipeline.benchmarks.commits import OLDER, ask, plain_scene, sides_of
+from pipeline.benchmarks.commits import OLDER, TURNS, ask, plain_scene, sides_of
 from pipeline.geometry.mesh import Mesh
 from pipeline.messages.objects import read_objects
 from pipeline.messages.scenes import read_scenes
@@ -36,7 +36,7 @@ STEPS: Mapping[str, tuple[str, ...]] = {
 
 
 def steps_of_both(
-    scene: ClutterScene, meshes: Mapping[str, Mesh], turns: int = 3
+    scene: ClutterScene, meshes: Mapping[str, Mesh], turns: int
 ) -> dict[str, dict[str, float]]:
     """Commit → step → processor time of labelling a clutter [ms], the least of some turns.
 
@@ -89,4 +89,4 @@ if __name__ == "__main__":
     run, wanted = Path(sys.argv[1]), sys.argv[2]
     clutter = next(s for s in read_scenes(run / "scenes.mcap") if s.scene_id == wanted)
     surfaces = {name: item.mesh for name, (item, _) in read_objects(run / "objects.mcap").items()}
-    sys.stdout.write(json.dumps(steps_of_both(clutter, surfaces), indent=1) + "\n")
+    sys.stdout.write(json.dumps(steps_of_both(clutter, surfaces, TURNS), indent=1) + "\n")

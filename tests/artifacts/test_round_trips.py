@@ -287,5 +287,6 @@ def test_scenes_in_files_of_their_own_are_read_by_their_index(
     with pytest.raises(ArtifactError, match="holds no scene 2"):
         read_scene(path, 2)
     kept[1].unlink()
+    same(read_scene(path, 0), scenes[0])  # of the others nothing is read
     with pytest.raises(ArtifactError, match=r"b\.mcap is missing"):
-        read_scene(path, 0)
+        read_scene(path, 1)
