@@ -134,6 +134,7 @@ def _in_order(
                 made = result_of(sent, sending, limit_s * len(some))
             except Exception as error:  # noqa: BLE001 - raised again by the item that it is of
                 logger.debug("{} items are made one by one: {}", len(some), error)
+                ray.cancel(sent, force=True)  # where it took too long it still runs
                 for one in some:
                     yield from _result(send([one])[1], sending, lost, limit_s).results
                 continue
