@@ -15,6 +15,8 @@ from loguru import logger
 from pipeline.benchmarks import asked
 from pipeline.geometry.mesh import Mesh
 from pipeline.gripper.problem import QualityProblem
+from pipeline.messages.objects import read_objects
+from pipeline.messages.scenes import read_scenes
 from pipeline.world.scene import ClutterScene
 
 OLDER = "19217de"  # as labelling was before its steps were made faster
@@ -161,6 +163,13 @@ def plain(
             ),
         },
     }
+
+
+def read_clutter(run: Path, scene_id: str) -> tuple[ClutterScene, dict[str, Mesh]]:
+    """A clutter of a run's folder, and the surface of each object of the run by its name [m]."""
+    scene = next(one for one in read_scenes(run / "scenes.mcap") if one.scene_id == scene_id)
+    objects = read_objects(run / "objects.mcap")
+    return scene, {name: item.mesh for name, (item, _) in objects.items()}
 
 
 def plain_scene(scene: ClutterScene, meshes: Mapping[str, Mesh]) -> asked.Plain:

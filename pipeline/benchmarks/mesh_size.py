@@ -14,15 +14,13 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from pipeline.benchmarks.commits import compare, plain_scene
+from pipeline.benchmarks.commits import compare, plain_scene, read_clutter
 from pipeline.benchmarks.labelling import bumpy
 from pipeline.config import RunConfig
 from pipeline.geometry.mesh import Mesh
 from pipeline.gripper import pad_of
 from pipeline.labelling.heights import pad_heights_by_rays
 from pipeline.labelling.sampling import contact_frames
-from pipeline.messages.objects import read_objects
-from pipeline.messages.scenes import read_scenes
 from pipeline.world.lines_down import PosedBlocks, follow_lines
 from pipeline.world.raycasting import RayScene
 from pipeline.world.scene import ClutterScene
@@ -58,8 +56,8 @@ def labelling_by_faces(scene: ClutterScene, meshes: Mapping[str, Mesh]) -> dict[
     """
     ratios = {}
     for times in CUTS:
-        finer = {item.object_name: meshes[item.object_name] for item in scene.objects}
-        finer = {name: cut_in_four(mesh, times) for name, mesh in finer.items()}
+        used = {item.object_name for item in scene.objects}
+        finer = {name: cut_in_four(meshes[name], times) for name in used}
         faces = int(np.median([len(finer[item.object_name].faces) for item in scene.objects]))
         for ratio in compare(plain_scene(scene, finer), ("label",)).values():
             ratios[faces] = round(ratio, 2)
@@ -102,10 +100,5 @@ if __name__ == "__main__":
     if len(sys.argv) == 1:
         answer: object = heights_by_faces()
     else:
-        run, wanted = Path(sys.argv[1]), sys.argv[2]
-        clutter = next(s for s in read_scenes(run / "scenes.mcap") if s.scene_id == wanted)
-        surfaces = {
-            name: item.mesh for name, (item, _) in read_objects(run / "objects.mcap").items()
-        }
-        answer = labelling_by_faces(clutter, surfaces)
+        answer = labelling_by_faces(*read_clutter(Path(sys.argv[1]), sys.argv[2]))
     sys.stdout.write(json.dumps(answer) + "\n")

@@ -11,10 +11,8 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
-from pipeline.benchmarks.commits import OLDER, TURNS, ask, plain_scene, sides_of
+from pipeline.benchmarks.commits import OLDER, TURNS, ask, plain_scene, read_clutter, sides_of
 from pipeline.geometry.mesh import Mesh
-from pipeline.messages.objects import read_objects
-from pipeline.messages.scenes import read_scenes
 from pipeline.world.scene import ClutterScene
 
 # Functions that a step consists of, in either commit; what one calls counts as its own.
@@ -86,7 +84,5 @@ def least(turns: Sequence[Mapping[str, float]]) -> dict[str, float]:
 
 
 if __name__ == "__main__":
-    run, wanted = Path(sys.argv[1]), sys.argv[2]
-    clutter = next(s for s in read_scenes(run / "scenes.mcap") if s.scene_id == wanted)
-    surfaces = {name: item.mesh for name, (item, _) in read_objects(run / "objects.mcap").items()}
+    clutter, surfaces = read_clutter(Path(sys.argv[1]), sys.argv[2])
     sys.stdout.write(json.dumps(steps_of_both(clutter, surfaces, TURNS), indent=1) + "\n")

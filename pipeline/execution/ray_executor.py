@@ -120,12 +120,12 @@ def _in_order(
     size, following = TaskSize(), iter(items)
     waiting: deque[tuple[list[Item], Any]] = deque()
 
-    def send(some: list[Item]) -> tuple[list[Item], Any]:
-        return some, remote.remote(*sending.message(named, some))
+    def send(some: list[Item]) -> Any:
+        return remote.remote(*sending.message(named, some))
 
     while True:
         while len(waiting) < ahead and (some := list(islice(following, size.items))):
-            waiting.append(send(some))
+            waiting.append((some, send(some)))
         if not waiting:
             return
         some, sent = waiting.popleft()
@@ -136,7 +136,7 @@ def _in_order(
                 logger.debug("{} items are made one by one: {}", len(some), error)
                 ray.cancel(sent, force=True)  # where it took too long it still runs
                 for one in some:
-                    yield from _result(send([one])[1], sending, lost, limit_s).results
+                    yield from _result(send([one]), sending, lost, limit_s).results
                 continue
         else:
             made = _result(sent, sending, lost, limit_s)
@@ -147,9 +147,8 @@ def _in_order(
 class TaskSize:
     """How many items a task holds: as many as take a second, and no fewer than one.
 
-    A task costs the driver some two milliseconds, whatever it holds. Only tasks of more than one
-    item are so short that this matters, and how long an item takes is known when the first are
-    there.
+    A task costs the driver about a millisecond, whatever it holds, so short items share one. How
+    long an item takes is learned from the tasks that came back.
     """
 
     def __init__(self) -> None:
