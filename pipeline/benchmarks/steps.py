@@ -18,7 +18,11 @@ from pipeline.world.scene import ClutterScene
 # Functions that a step consists of, in either commit; what one calls counts as its own.
 STEPS: Mapping[str, tuple[str, ...]] = {
     "everything": ("asked.py label",),
-    "Embree's tree": ("grasps.py ray_scene", "scene.py scene_surfaces"),
+    "surfaces and Embree's tree": (
+        "grasps.py ray_scene",
+        "scene.py scene_surfaces",
+        "raycasting.py _embree",
+    ),
     "points and normals of pictures": ("grasps.py visible_surface", "scene.py visible_surface"),
     "proposals": ("sampling.py propose", "sampling.py propose_nearby"),
     "normals, of proposals": ("sampling.py mean_normals",),
@@ -29,7 +33,7 @@ STEPS: Mapping[str, tuple[str, ...]] = {
     "noise": ("depth_noise.py disturb",),
     "sub clouds": ("grasps.py with_clouds", "scene.py add_clouds"),
     "balancing": ("balancing.py balance_labels", "balancing.py proposal_weights"),
-    "all but tree and writing": ("grasps.py synthesize", "scene.py label_scene"),
+    "all but surfaces and writing": ("grasps.py synthesize", "scene.py label_scene"),
 }
 
 

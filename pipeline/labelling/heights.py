@@ -12,9 +12,9 @@ from jaxtyping import Float, Int
 
 from pipeline.geometry.mesh import Mesh
 from pipeline.gripper.pad import Pad
-from pipeline.world.lines_down import PosedBlocks, follow_lines
+from pipeline.world.lines_down import follow_lines
 from pipeline.world.raycasting import Surfaces
-from pipeline.world.triangle_blocks import blocks_of, mean_area_m2
+from pipeline.world.triangle_blocks import mean_area_m2
 
 # Rays are quicker where triangles are smaller than this: a tenth of what a vertex of the pad of
 # Table I has for itself. Measured in `runs/SPEED.md`.
@@ -48,8 +48,8 @@ def pad_heights(
     (n, v), -1 for none.
     """
     bodies = surfaces.bodies
-    if bodies and triangles_per_m2([mesh for mesh, _, _ in bodies]) <= 1.0 / _FINEST_M2:
-        posed = [PosedBlocks(blocks_of(mesh), pose, number) for mesh, pose, number in bodies]
+    if bodies and triangles_per_m2([body.mesh for body in bodies]) <= 1.0 / _FINEST_M2:
+        posed = [body.blocks for body in bodies]
         return follow_lines(posed, world_from_contact, pad.vertices_xy_m, clearance_m)
     return pad_heights_by_rays(world_from_contact, surfaces, pad, clearance_m)
 

@@ -17,7 +17,7 @@ from pipeline.labelling.rounds import KeptGrasps, sample_grasps, split_evenly
 from pipeline.labelling.sampling import Proposal, VisibleSurface
 from pipeline.world.cameras import pixel_rays, shown_whole
 from pipeline.world.posed_bodies import bodies_at_rest, surfaces_at_rest
-from pipeline.world.raycasting import RayScene, Surfaces
+from pipeline.world.raycasting import RayScene
 from pipeline.world.scene import ClutterScene
 from pipeline.world.view import CameraView
 
@@ -48,7 +48,7 @@ def scene_surfaces(
 
 def label_scene(
     scene: ClutterScene,
-    surfaces: Surfaces,
+    surfaces: RayScene,
     config: RunConfig,
     wanted: int,
     rng: np.random.Generator,
@@ -119,7 +119,7 @@ def noise_shared_by(split: str, config: RunConfig) -> int:
     return config.grasps.noise_shared_by if split == "train" else 0
 
 
-def visible_surface(view: CameraView, surfaces: Surfaces, radius_m: float) -> VisibleSurface:
+def visible_surface(view: CameraView, surfaces: RayScene, radius_m: float) -> VisibleSurface:
     """Find the exact surface point and normal at each pixel that shows an object.
 
     Parameters
@@ -136,7 +136,7 @@ def visible_surface(view: CameraView, surfaces: Surfaces, radius_m: float) -> Vi
     A point and a normal for each pixel that shows an object; none where the picture shows none.
     """
     origin, directions = pixel_rays(view.camera, view.segmentation > 0)
-    hits = surfaces.cast(np.broadcast_to(origin, directions.shape), directions)
+    hits = surfaces.first_seen(view.camera, view.segmentation > 0, directions)
     seen = hits.body > 0
     points = origin + hits.distance_m[seen, None] * directions[seen]
     whole = shown_whole(view.camera, points, radius_m)

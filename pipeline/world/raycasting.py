@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from embreex import rtcore_scene
@@ -11,6 +12,10 @@ from jaxtyping import Bool, Float, Int
 
 from pipeline.compiled_code import njit
 from pipeline.geometry.mesh import Mesh
+from pipeline.world.cameras import PinholeCamera
+from pipeline.world.drawn_pixels import first_faces
+from pipeline.world.lines_down import PosedBlocks
+from pipeline.world.triangle_blocks import blocks_of
 
 # Embree works in float32. The scene is moved to the origin and scaled to this size, so that neither
 # a scene far from its origin nor very small triangles lose digits.
@@ -40,12 +45,18 @@ class RayHits:
     triangle: Int[np.ndarray, " n"]
 
 
-class RestingBody(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class RestingBody:
     """A mesh in its own frame, where it stays the same in all scenes, its pose and its number."""
 
     mesh: Mesh
     world_from_mesh: Float[np.ndarray, "4 4"]
     body_id: int
+
+    @cached_property
+    def blocks(self) -> PosedBlocks:
+        """Its triangles as they are drawn, sorted when they are first asked for."""
+        return PosedBlocks(blocks_of(self.mesh), self.world_from_mesh, self.body_id)
 
 
 class Surfaces(Protocol):
@@ -108,7 +119,7 @@ class RayScene:
         lower, upper = vertices.min(axis=0), vertices.max(axis=0)
         self._centre = (lower + upper) / 2
         self._scale = _EMBREE_EXTENT / max(float(np.max(upper - lower)), 1e-12)
-        self._corners = np.ascontiguousarray(vertices[faces])
+        self._vertices, self._faces = vertices, np.ascontiguousarray(faces, dtype=np.int64)
         self._body_of_face = np.repeat(ids, counts)
         self._first_face = np.zeros(int(ids.max()) + 1, dtype=np.int64)  # by body id
         self._first_face[ids] = np.cumsum([0, *counts])[:-1]
@@ -120,30 +131,28 @@ class RayScene:
             for i in np.argsort(tops, kind="stable")[::-1]
             if counts[i] > 0
         )
-        self._embree = rtcore_scene.EmbreeScene(robust=True)
+
+    @cached_property
+    def _embree(self) -> rtcore_scene.EmbreeScene:
+        """The triangles in Embree's tree, built when the first ray is cast."""
+        tree = rtcore_scene.EmbreeScene(robust=True)
         TriangleMesh(
-            scene=self._embree,
-            vertices=((vertices - self._centre) * self._scale).astype(np.float32),
-            indices=faces.astype(np.int32),
+            scene=tree,
+            vertices=((self._vertices - self._centre) * self._scale).astype(np.float32),
+            indices=self._faces.astype(np.int32),
         )
+        return tree
 
     @property
     def bodies(self) -> tuple[RestingBody, ...]:
         """The bodies, highest first."""
         return self._bodies
 
-    @property
-    def triangle_normals(self) -> Float[np.ndarray, "m 3"]:
-        """Unit outward normals of all triangles, bodies one after the other."""
-        edge1 = self._corners[:, 1] - self._corners[:, 0]
-        edge2 = self._corners[:, 2] - self._corners[:, 0]
-        normals = np.cross(edge1, edge2)
-        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-        return np.asarray(normals / np.where(lengths > 0, lengths, 1.0))
-
     def normals_at(self, hits: RayHits) -> Float[np.ndarray, "n 3"]:
         """Unit outward normal of the triangle each ray hit; NaN where nothing was hit."""
-        return np.asarray(_normals(self._corners, hits.body, hits.triangle, self._first_face))
+        return np.asarray(
+            _normals(self._vertices, self._faces, hits.body, hits.triangle, self._first_face)
+        )
 
     def barycentric_at(
         self, hits: RayHits, points_m: Float[np.ndarray, "n 3"]
@@ -151,9 +160,8 @@ class RayScene:
         """Weights of the hit triangle's corners at each point on it; NaN where nothing was hit."""
         weights = np.full((len(hits.body), 3), np.nan)
         hit = hits.body >= 0
-        a, b, c = self._corners[self._first_face[hits.body[hit]] + hits.triangle[hit]].swapaxes(
-            0, 1
-        )
+        face = self._first_face[hits.body[hit]] + hits.triangle[hit]
+        a, b, c = self._vertices[self._faces[face]].swapaxes(0, 1)
         doubled = np.cross(b - a, c - a)
         area = (doubled**2).sum(axis=1)
         point = points_m[hit]
@@ -201,7 +209,7 @@ class RayScene:
             nothing = np.empty(0, dtype=np.int64)
             return RayHits(np.empty(0), nothing, nothing)
         face = self._first_faces(near, along)
-        distance, from_inside = _plane_distances(self._corners, face, origins, rays)
+        distance, from_inside = self._distances(face, origins, rays)
         # About one in a thousand of the rays aimed exactly at an edge passes through it and hits
         # the far wall from inside. Rays that start inside a body are cast again too, and keep
         # their hit.
@@ -210,11 +218,51 @@ class RayScene:
             aside = np.array([0.6, -0.48, 0.64]) * (_ASIDE * _EMBREE_EXTENT / self._scale)
             moved = ((origins[again] + aside - self._centre) * self._scale).astype(np.float32)
             second = self._first_faces(moved, along[again])
-            nearer, _ = _plane_distances(self._corners, second, origins[again], rays[again])
+            nearer, _ = self._distances(second, origins[again], rays[again])
             better = nearer < distance[again]
             face[again[better]] = second[better]
             distance[again[better]] = nearer[better]
         return RayHits(distance, *_named(face, self._body_of_face, self._first_face))
+
+    def first_seen(
+        self,
+        camera: PinholeCamera,
+        shown: Bool[np.ndarray, "h w"],
+        directions: Float[np.ndarray, "n 3"],
+    ) -> RayHits:
+        """First hit of the ray through each chosen pixel's centre, row by row.
+
+        The same as `cast` with `cameras.pixel_rays`, without a tree: triangles are drawn into the
+        picture. Where a ray meets the edge of two triangles, either may be named.
+
+        Parameters
+        ----------
+        camera
+            A camera in the scene's frame.
+        shown
+            The chosen pixels, shape (h, w).
+        directions
+            Their rays by `cameras.pixel_rays`, shape (n, 3).
+
+        Returns
+        -------
+        The hits.
+        """
+        rays = directions / np.sqrt(np.einsum("ij,ij->i", directions, directions))[:, None]
+        face = first_faces(self._vertices, self._faces, camera, shown, directions)
+        origins = np.tile(camera.world_from_camera[:3, 3], (len(rays), 1))
+        distance, _ = self._distances(face, origins, rays)
+        return RayHits(distance, *_named(face, self._body_of_face, self._first_face))
+
+    def _distances(
+        self,
+        face: Int[np.ndarray, " n"],
+        origins: Float[np.ndarray, "n 3"],
+        rays: Float[np.ndarray, "n 3"],
+    ) -> tuple[Float[np.ndarray, " n"], Bool[np.ndarray, " n"]]:
+        """Distance to each ray's face, and whether it is seen from behind."""
+        distance, from_inside = _plane_distances(self._vertices, self._faces, face, origins, rays)
+        return distance, from_inside
 
     def _first_faces(
         self, origins: Float[np.ndarray, "n 3"], rays: Float[np.ndarray, "n 3"]
@@ -253,7 +301,8 @@ def _prepared(
 
 @njit(error_model="numpy")
 def _normals(
-    corners: Float[np.ndarray, "m 3 3"],
+    vertices: Float[np.ndarray, "v 3"],
+    faces: Int[np.ndarray, "m 3"],
     body: Int[np.ndarray, " n"],
     triangle: Int[np.ndarray, " n"],
     first_face: Int[np.ndarray, " bodies"],
@@ -263,7 +312,8 @@ def _normals(
     for i in range(len(body)):
         if body[i] < 0:
             continue
-        a, b, c = corners[first_face[body[i]] + triangle[i]]
+        corners = faces[first_face[body[i]] + triangle[i]]
+        a, b, c = vertices[corners[0]], vertices[corners[1]], vertices[corners[2]]
         ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
         vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
         nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
@@ -289,7 +339,8 @@ def _named(
 
 @njit()
 def _plane_distances(
-    corners: Float[np.ndarray, "m 3 3"],
+    vertices: Float[np.ndarray, "v 3"],
+    faces: Int[np.ndarray, "m 3"],
     face: Int[np.ndarray, " n"],
     origins: Float[np.ndarray, "n 3"],
     rays: Float[np.ndarray, "n 3"],
@@ -306,7 +357,8 @@ def _plane_distances(
     for i in range(len(face)):
         if face[i] < 0:
             continue
-        a, b, c = corners[face[i], 0], corners[face[i], 1], corners[face[i], 2]
+        corners = faces[face[i]]
+        a, b, c = vertices[corners[0]], vertices[corners[1]], vertices[corners[2]]
         x, y, z = rays[i]
         ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
         vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]

@@ -7,8 +7,10 @@ tested in SIMD lanes.
 
 from dataclasses import dataclass
 from functools import lru_cache
+from threading import Lock
 
 import numpy as np
+from cachetools import LRUCache, cached
 from jaxtyping import Float, Int
 
 from pipeline.compiled_code import njit
@@ -22,6 +24,8 @@ LANES = 16
 _BITS = 16
 # Key digits sorted at a time: the counts of 2^13 digits stay in the L1 cache.
 _DIGIT_BITS = 13
+# Blocks of meshes kept for the next clutter, by their triangles: some 250 MB.
+_KEPT_TRIANGLES = 1 << 21
 # A triangle as long as this share of the scene lies in blocks of its own kind, so that a table does
 # not blow up the box of what stands on it.
 _LONG = 0.125
@@ -63,9 +67,9 @@ class TriangleBlocks:
     extent_m: float
 
 
-@lru_cache(maxsize=128)
+@cached(LRUCache(_KEPT_TRIANGLES, getsizeof=lambda blocks: len(blocks.face)), lock=Lock())
 def blocks_of(mesh: Mesh) -> TriangleBlocks:
-    """The blocks of a mesh in its own frame; those of the last 128 meshes are kept."""
+    """The blocks of a mesh in its own frame; those of the last meshes are kept."""
     return build_blocks(_corners(mesh))
 
 

@@ -49,7 +49,7 @@ def by_rays(scene: RayScene, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 def drawn(scene: RayScene, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Heights and bodies under the points, drawn."""
-    posed = [PosedBlocks(blocks_of(mesh), pose, number) for mesh, pose, number in scene.bodies]
+    posed = [body.blocks for body in scene.bodies]
     return follow_lines(posed, frames, POINTS, TOP_M)
 
 
