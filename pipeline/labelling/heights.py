@@ -16,9 +16,11 @@ from pipeline.world.lines_down import follow_lines
 from pipeline.world.raycasting import Surfaces
 from pipeline.world.triangle_blocks import mean_area_m2
 
-# Rays are quicker where triangles are smaller than this: a tenth of what a vertex of the pad of
-# Table I has for itself. Measured in `runs/SPEED.md`.
+# Rays are quicker where triangles are smaller than this, of one body: a tenth of what a vertex of the
+# pad of Table I has for itself. A clutter's rays need a tree of all its bodies, which takes longer
+# than drawing down to the second. Measured in `runs/SPEED.md`.
 _FINEST_M2 = 0.3e-6
+_FINEST_OF_MANY_M2 = 0.05e-6
 # Triangles of no area at all count as this small, so that nothing is divided by zero.
 _NO_AREA_M2 = 1e-18
 
@@ -48,7 +50,8 @@ def pad_heights(
     (n, v), -1 for none.
     """
     bodies = surfaces.bodies
-    if bodies and triangles_per_m2([body.mesh for body in bodies]) <= 1.0 / _FINEST_M2:
+    finest_m2 = _FINEST_M2 if len(bodies) == 1 else _FINEST_OF_MANY_M2
+    if bodies and triangles_per_m2([body.mesh for body in bodies]) <= 1.0 / finest_m2:
         posed = [body.blocks for body in bodies]
         return follow_lines(posed, world_from_contact, pad.vertices_xy_m, clearance_m)
     return pad_heights_by_rays(world_from_contact, surfaces, pad, clearance_m)

@@ -56,16 +56,18 @@ def first_faces(
     vertices = np.ascontiguousarray(vertices_m, dtype=np.float64)
     ray_of_pixel = np.full(shown.shape, -1, dtype=np.int32)
     ray_of_pixel[shown] = np.arange(len(rays), dtype=np.int32)
-    place = _projected(
+    around, depth_m = _projected(
         vertices,
         invert(camera.world_from_camera),
         (float(k[0, 0]), float(k[1, 1]), float(k[0, 2]), float(k[1, 2])),
+        shown.shape,
     )
     return np.asarray(
         _drawn(
             vertices,
             np.ascontiguousarray(faces, dtype=np.int64),
-            place,
+            around,
+            depth_m,
             np.array(camera.world_from_camera[:3, 3]),
             np.array(camera.world_from_camera[:3, 2]),
             np.ascontiguousarray(rays),
@@ -79,31 +81,48 @@ def _projected(
     vertices: Float[np.ndarray, "v 3"],
     camera_from_world: Float[np.ndarray, "4 4"],
     lens: tuple[float, float, float, float],
-) -> Float[np.ndarray, "v 3"]:
-    """Column and row of each corner, whole at pixels' centres, and depth [m]; the first two are
-    NaN where it is not ahead."""
+    shape: tuple[int, int],
+) -> tuple[Int[np.ndarray, "v 4"], Float[np.ndarray, " v"]]:
+    """Pixels whose centres lie next to each corner: the first column to its right, the last to its
+    left, the first row below, the last above; and its depth [m].
+
+    Of a triangle's corners the least first and the largest last pixel are those that it may cover.
+    They are all pixels where a corner is not ahead.
+    """
+    height, width = shape
     focal_x, focal_y, centre_x, centre_y = lens
     t = camera_from_world
-    place = np.empty((len(vertices), 3))
+    around, depths = np.empty((len(vertices), 4), np.int32), np.empty(len(vertices))
     for i in range(len(vertices)):
         x, y, z = vertices[i, 0], vertices[i, 1], vertices[i, 2]
         depth = t[2, 0] * x + t[2, 1] * y + t[2, 2] * z + t[2, 3]
-        right = t[0, 0] * x + t[0, 1] * y + t[0, 2] * z + t[0, 3]
-        down = t[1, 0] * x + t[1, 1] * y + t[1, 2] * z + t[1, 3]
-        place[i, 2] = depth
+        depths[i] = depth
         if depth > _AHEAD_M:
-            place[i, 0] = focal_x * (right / depth) + (centre_x - PIXEL_CENTRE_PX)
-            place[i, 1] = focal_y * (down / depth) + (centre_y - PIXEL_CENTRE_PX)
+            right = t[0, 0] * x + t[0, 1] * y + t[0, 2] * z + t[0, 3]
+            down = t[1, 0] * x + t[1, 1] * y + t[1, 2] * z + t[1, 3]
+            column = focal_x * (right / depth) + (centre_x - PIXEL_CENTRE_PX)
+            row = focal_y * (down / depth) + (centre_y - PIXEL_CENTRE_PX)
+            around[i, 0], around[i, 1] = _next_to(column, width)
+            around[i, 2], around[i, 3] = _next_to(row, height)
         else:
-            place[i, 0] = place[i, 1] = np.nan
-    return place
+            around[i, 0], around[i, 1], around[i, 2], around[i, 3] = 0, width - 1, 0, height - 1
+    return around, depths
+
+
+@njit(forceinline=True)
+def _next_to(place: float, count: int) -> tuple[int, int]:
+    """The first pixel at or after a place along an axis and the last at or before it; -1 and
+    ``count`` stand for those beyond the picture."""
+    within = min(max(place, -1.0), float(count))
+    return int(np.ceil(within - _WIDER_PX)), int(np.floor(within + _WIDER_PX))
 
 
 @njit(error_model="numpy")
 def _drawn(
     vertices: Float[np.ndarray, "v 3"],
     faces: Int[np.ndarray, "m 3"],
-    place: Float[np.ndarray, "v 3"],
+    around: Int[np.ndarray, "v 4"],
+    depths: Float[np.ndarray, " v"],
     origin: Float[np.ndarray, " 3"],
     ahead: Float[np.ndarray, " 3"],
     rays: Float[np.ndarray, "n 3"],
@@ -115,13 +134,17 @@ def _drawn(
     depth_of_nearest = np.full(len(rays), np.inf)  # a little more, as it only spares work
     for face in range(len(faces)):
         i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
-        left, right = _range(place[i, 0], place[j, 0], place[k, 0], width)
+        left = min(around[i, 0], around[j, 0], around[k, 0])
+        right = max(around[i, 1], around[j, 1], around[k, 1])
         if left > right:
             continue
-        top, bottom = _range(place[i, 1], place[j, 1], place[k, 1], height)
+        top = min(around[i, 2], around[j, 2], around[k, 2])
+        bottom = max(around[i, 3], around[j, 3], around[k, 3])
         if top > bottom:
             continue
-        depth = min(place[i, 2], place[j, 2], place[k, 2])
+        left, right = max(left, 0), min(right, width - 1)
+        top, bottom = max(top, 0), min(bottom, height - 1)
+        depth = min(depths[i], depths[j], depths[k])
         begun = False
         for row in range(top, bottom + 1):
             for column in range(left, right + 1):
@@ -163,18 +186,6 @@ def _drawn(
                     along = x * ahead[0] + y * ahead[1] + z * ahead[2]
                     depth_of_nearest[ray] = distance * along * (1.0 + _DEEPER)
     return found
-
-
-@njit(forceinline=True)
-def _range(a: float, b: float, c: float, count: int) -> tuple[int, int]:
-    """First and last pixel that a triangle may cover along an axis; all where it is not ahead."""
-    if not np.isfinite(a + b + c):
-        return 0, count - 1
-    first = np.ceil(max(min(a, b, c) - _WIDER_PX, 0.0))
-    last = np.floor(min(max(a, b, c) + _WIDER_PX, count - 1.0))
-    if first > last:
-        return 1, 0
-    return int(first), int(last)
 
 
 @njit(forceinline=True)
