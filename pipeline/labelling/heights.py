@@ -16,9 +16,9 @@ from pipeline.world.lines_down import follow_lines
 from pipeline.world.raycasting import Surfaces
 from pipeline.world.triangle_blocks import mean_area_m2
 
-# Rays are quicker where triangles are smaller than this, of one body: a tenth of what a vertex of the
-# pad of Table I has for itself. A clutter's rays need a tree of all its bodies, which takes longer
-# than drawing down to the second. Measured in `runs/SPEED.md`.
+# Rays are quicker at one body whose triangles are smaller than the first: a tenth of what a vertex
+# of the pad of Table I has for itself. At several bodies rays need a tree of all, which costs more
+# than drawing triangles does down to the second. Measured in `runs/SPEED.md`.
 _FINEST_M2 = 0.3e-6
 _FINEST_OF_MANY_M2 = 0.05e-6
 # Triangles of no area at all count as this small, so that nothing is divided by zero.

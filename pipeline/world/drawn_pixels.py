@@ -65,7 +65,7 @@ def first_faces(
     return np.asarray(
         _drawn(
             vertices,
-            np.ascontiguousarray(faces, dtype=np.int64),
+            np.ascontiguousarray(faces),
             around,
             depth_m,
             np.array(camera.world_from_camera[:3, 3]),

@@ -111,15 +111,11 @@ class RayScene:
         ids = np.arange(len(bodies)) if body_ids is None else np.asarray(body_ids, dtype=np.int64)
         if len(ids) != len(bodies) or len(np.unique(ids)) != len(ids) or ids.min() < 0:
             raise ValueError(f"{len(bodies)} bodies need as many distinct ids from 0, got {ids}")
-        offsets = np.cumsum([0, *(len(body.vertices_m) for body in bodies)])[:-1]
-        vertices = np.concatenate([body.vertices_m for body in bodies]).astype(np.float64)
-        faces = np.concatenate(
-            [body.faces + offset for body, offset in zip(bodies, offsets, strict=True)]
-        )
+        vertices, faces = _joined(bodies)
         lower, upper = vertices.min(axis=0), vertices.max(axis=0)
         self._centre = (lower + upper) / 2
         self._scale = _EMBREE_EXTENT / max(float(np.max(upper - lower)), 1e-12)
-        self._vertices, self._faces = vertices, np.ascontiguousarray(faces, dtype=np.int64)
+        self._vertices, self._faces = vertices, faces
         self._body_of_face = np.repeat(ids, counts)
         self._first_face = np.zeros(int(ids.max()) + 1, dtype=np.int64)  # by body id
         self._first_face[ids] = np.cumsum([0, *counts])[:-1]
@@ -139,7 +135,7 @@ class RayScene:
         TriangleMesh(
             scene=tree,
             vertices=((self._vertices - self._centre) * self._scale).astype(np.float32),
-            indices=self._faces.astype(np.int32),
+            indices=self._faces,
         )
         return tree
 
@@ -273,6 +269,21 @@ class RayScene:
         """
         # Without `output`, Embree returns only the triangle, which is twice as fast.
         return np.asarray(self._embree.run(origins, rays), dtype=np.int64)
+
+
+def _joined(
+    bodies: Sequence[Mesh],
+) -> tuple[Float[np.ndarray, "v 3"], Int[np.ndarray, "m 3"]]:
+    """Corners of all bodies, and faces that index them, in Embree's integers."""
+    vertices = np.empty((sum(len(body.vertices_m) for body in bodies), 3))
+    faces = np.empty((sum(len(body.faces) for body in bodies), 3), dtype=np.int32)
+    vertex = face = 0
+    for body in bodies:
+        faces_to, vertices_to = face + len(body.faces), vertex + len(body.vertices_m)
+        vertices[vertex:vertices_to] = body.vertices_m
+        np.add(body.faces, vertex, out=faces[face:faces_to], casting="same_kind")
+        vertex, face = vertices_to, faces_to
+    return vertices, faces
 
 
 @njit()

@@ -38,13 +38,20 @@ def test_drawn_heights_are_those_of_rays(subdivisions: int) -> None:
     assert (body == hit).all()
 
 
-def test_rays_are_cast_at_fine_meshes(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("limit", "bodies"), [("_FINEST_M2", 1), ("_FINEST_OF_MANY_M2", 2)], ids=["one", "several"]
+)
+def test_rays_are_cast_at_fine_meshes(
+    limit: str, bodies: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
     scene, frames = ball_and_frames(4)
+    below = scene.bodies[0].mesh.transformed(np.diag([1.0, 1.0, -1.0, 1.0]))
+    scene = RayScene([scene.bodies[0].mesh, below][:bodies])
     pad = pad_of(PadConfig())
-    monkeypatch.setattr(heights, "_FINEST_M2", 1.0)
-    found, _ = pad_heights(frames, scene, pad, CLEARANCE_M)
     cast, _ = pad_heights_by_rays(frames, scene, pad, CLEARANCE_M)
-    assert found.tobytes() == cast.tobytes()
+    assert pad_heights(frames, scene, pad, CLEARANCE_M)[0].tobytes() != cast.tobytes()
+    monkeypatch.setattr(heights, limit, 1.0)
+    assert pad_heights(frames, scene, pad, CLEARANCE_M)[0].tobytes() == cast.tobytes()
 
 
 def test_bodies_count_alike_and_a_table_does_not() -> None:

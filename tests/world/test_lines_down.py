@@ -199,3 +199,21 @@ def test_bounds_leave_no_pair_out(seed: int, thinness: float, away_m: float) -> 
     heights, _ = drawn(RayScene([mesh]), frames)
     for frame, height in zip(frames, heights, strict=True):
         assert height.tobytes() == decided_one_by_one(mesh, frame).tobytes()
+
+
+def test_sorted_triangles_are_kept_for_the_next_scene_and_with_this_one() -> None:
+    mesh = mesh_of(trimesh.creation.icosphere(2, 0.05))
+    scene, next_scene = RayScene([mesh]), RayScene([mesh])
+    blocks = scene.bodies[0].blocks.blocks
+    assert next_scene.bodies[0].blocks.blocks is blocks
+    blocks_of.cache.clear()  # as many other meshes would
+    assert scene.bodies[0].blocks.blocks is blocks
+
+
+def test_what_is_kept_is_counted_in_triangles() -> None:
+    meshes = [mesh_of(trimesh.creation.icosphere(size, 0.05)) for size in (2, 3)]
+    blocks_of.cache.clear()
+    for mesh in meshes:
+        blocks_of(mesh)
+    assert blocks_of.cache.currsize == sum(len(mesh.faces) for mesh in meshes)
+    assert blocks_of.cache.maxsize < 1e7
