@@ -12,7 +12,7 @@ from pipeline.compiled_code import njit
 from pipeline.geometry.transforms import invert
 from pipeline.world.cameras import PIXEL_CENTRE_PX, PinholeCamera
 
-# A rectangle is wider by this, as projection rounds; what a triangle covers is decided exactly.
+# A rectangle is wider by this, as projection rounds; what lies within is decided by the corners.
 _WIDER_PX = 1e-6
 # A side counts as farther out by this share of the squared distance, so that rounding leaves no gap
 # between neighbours: 1e-11 m for sides of a millimetre at a metre.
