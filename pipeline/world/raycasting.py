@@ -80,7 +80,7 @@ class Surfaces(Protocol):
 
 
 class RayScene:
-    """Triangle surfaces of several bodies, all in one frame, ready for ray casting.
+    """Triangle surfaces of several bodies, all in one frame: rays are cast, pictures are drawn.
 
     The scene is fixed: build another when a body moves.
 
