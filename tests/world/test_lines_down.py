@@ -2,10 +2,12 @@
 
 import os
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import trimesh
+from cachetools import Cache
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -201,19 +203,27 @@ def test_bounds_leave_no_pair_out(seed: int, thinness: float, away_m: float) -> 
         assert height.tobytes() == decided_one_by_one(mesh, frame).tobytes()
 
 
+def kept_blocks() -> Cache[Any, Any]:
+    """The blocks that are kept from scene to scene, none of them left."""
+    cache = blocks_of.cache
+    assert isinstance(cache, Cache)
+    cache.clear()
+    return cache
+
+
 def test_sorted_triangles_are_kept_for_the_next_scene_and_with_this_one() -> None:
     mesh = mesh_of(trimesh.creation.icosphere(2, 0.05))
     scene, next_scene = RayScene([mesh]), RayScene([mesh])
     blocks = scene.bodies[0].blocks.blocks
     assert next_scene.bodies[0].blocks.blocks is blocks
-    blocks_of.cache.clear()  # as many other meshes would
+    kept_blocks()  # as many other meshes would leave it
     assert scene.bodies[0].blocks.blocks is blocks
 
 
 def test_what_is_kept_is_counted_in_triangles() -> None:
     meshes = [mesh_of(trimesh.creation.icosphere(size, 0.05)) for size in (2, 3)]
-    blocks_of.cache.clear()
+    cache = kept_blocks()
     for mesh in meshes:
         blocks_of(mesh)
-    assert blocks_of.cache.currsize == sum(len(mesh.faces) for mesh in meshes)
-    assert blocks_of.cache.maxsize < 1e7
+    assert cache.currsize == sum(len(mesh.faces) for mesh in meshes)
+    assert cache.maxsize < 1e7
