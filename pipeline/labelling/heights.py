@@ -52,7 +52,7 @@ def pad_heights(
     bodies = surfaces.bodies
     finest_m2 = _FINEST_M2 if len(bodies) == 1 else _FINEST_OF_MANY_M2
     if bodies and triangles_per_m2([body.mesh for body in bodies]) <= 1.0 / finest_m2:
-        posed = [body.blocks for body in bodies]
+        posed = [body.posed_blocks for body in bodies]
         return follow_lines(posed, world_from_contact, pad.vertices_xy_m, clearance_m)
     return pad_heights_by_rays(world_from_contact, surfaces, pad, clearance_m)
 

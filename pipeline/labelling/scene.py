@@ -135,8 +135,9 @@ def visible_surface(view: CameraView, surfaces: RayScene, radius_m: float) -> Vi
     -------
     A point and a normal for each pixel that shows an object; none where the picture shows none.
     """
-    origin, directions = pixel_rays(view.camera, view.segmentation > 0)
-    hits = surfaces.first_seen(view.camera, view.segmentation > 0, directions)
+    shown = view.segmentation > 0
+    origin, directions = pixel_rays(view.camera, shown)
+    hits = surfaces.first_seen(view.camera, shown, directions)
     seen = hits.body > 0
     points = origin + hits.distance_m[seen, None] * directions[seen]
     whole = shown_whole(view.camera, points, radius_m)

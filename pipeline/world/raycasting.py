@@ -54,7 +54,7 @@ class RestingBody:
     body_id: int
 
     @cached_property
-    def blocks(self) -> PosedBlocks:
+    def posed_blocks(self) -> PosedBlocks:
         """Its triangles as they are drawn, sorted when they are first asked for."""
         return PosedBlocks(blocks_of(self.mesh), self.world_from_mesh, self.body_id)
 
@@ -244,6 +244,7 @@ class RayScene:
         -------
         The hits.
         """
+        # Scaled as `cast` scales rays: where both name the same face, distances have the same bits.
         rays = directions / np.sqrt(np.einsum("ij,ij->i", directions, directions))[:, None]
         face = first_faces(self._vertices, self._faces, camera, shown, directions)
         origins = np.tile(camera.world_from_camera[:3, 3], (len(rays), 1))

@@ -51,7 +51,7 @@ def by_rays(scene: RayScene, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 def drawn(scene: RayScene, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Heights and bodies under the points, drawn."""
-    posed = [body.blocks for body in scene.bodies]
+    posed = [body.posed_blocks for body in scene.bodies]
     return follow_lines(posed, frames, POINTS, TOP_M)
 
 
@@ -214,10 +214,10 @@ def kept_blocks() -> Cache[Any, Any]:
 def test_sorted_triangles_are_kept_for_the_next_scene_and_with_this_one() -> None:
     mesh = mesh_of(trimesh.creation.icosphere(2, 0.05))
     scene, next_scene = RayScene([mesh]), RayScene([mesh])
-    blocks = scene.bodies[0].blocks.blocks
-    assert next_scene.bodies[0].blocks.blocks is blocks
+    blocks = scene.bodies[0].posed_blocks.blocks
+    assert next_scene.bodies[0].posed_blocks.blocks is blocks
     kept_blocks()  # as many other meshes would leave it
-    assert scene.bodies[0].blocks.blocks is blocks
+    assert scene.bodies[0].posed_blocks.blocks is blocks
 
 
 def test_what_is_kept_is_counted_in_triangles() -> None:
