@@ -170,6 +170,7 @@ def _draw(
     # Of each child: columns and rows of cells, lowest and highest z.
     cells = np.empty(4 * LANES, dtype=np.int32)
     low_high = np.empty(2 * LANES, dtype=np.float32)
+    rank, keys = np.empty(LANES, dtype=np.int32), np.empty(LANES, dtype=np.int32)
     seen, edges = np.empty(9 * LANES), np.empty(10 * LANES, dtype=np.float32)
     sides, near_turn = np.empty(5 * LANES, dtype=np.float32), np.empty(12, dtype=np.float32)
     near_reach = np.float32(reach)
@@ -211,21 +212,14 @@ def _draw(
                 _place_children(
                     boxes[node - len(corners)], turn, centre, slack, lower, per_m, cells, low_high
                 )
-                base = waiting
+                kept = _rank_by_top(top, within, cells, low_high, count[node], keys, rank)
                 for k in range(count[node]):
-                    if low_high[k] > top or _points_in(within, cells, k) == 0:
-                        continue
-                    # The highest child is put last and walked first.
-                    to = waiting
-                    while to > base and top_at[to - 1] > low_high[LANES + k]:
-                        node_at[to], top_at[to] = node_at[to - 1], top_at[to - 1]
-                        for side in range(4):
-                            cells_at[to, side] = cells_at[to - 1, side]
-                        to -= 1
+                    # The highest child is put last and walked first; what is left out lies beyond.
+                    to = waiting + rank[k]
                     node_at[to], top_at[to] = first[node] + k, low_high[LANES + k]
                     for side in range(4):
                         cells_at[to, side] = cells[side * LANES + k]
-                    waiting += 1
+                waiting += kept
                 continue
             if not ready:
                 for i in range(len(so_far)):
@@ -308,6 +302,41 @@ def _points_in(within: Int[np.ndarray, "more more"], cells: Int[np.ndarray, " 64
     if left >= right or low >= high:
         return 0
     return int(within[high, right] - within[low, right] - within[high, left] + within[low, left])
+
+
+@njit(error_model="numpy")
+def _rank_by_top(
+    top: float,
+    within: Int[np.ndarray, "more more"],
+    cells: Int[np.ndarray, " 64"],
+    low_high: Float[np.ndarray, " 32"],
+    children: int,
+    keys: Int[np.ndarray, " 16"],
+    rank: Int[np.ndarray, " 16"],
+) -> int:
+    """Place of each child among those with points under ``top``, the highest last; the others come
+    after them. Returns how many have such points.
+
+    Each is compared with all others, which SIMD lanes do sooner than one insertion after another.
+    """
+    bits = low_high.view(np.int32)
+    kept = 0
+    for k in range(LANES):
+        # Whole numbers in the order of the heights; the lane in the last bits makes all differ.
+        key = bits[LANES + k]
+        key ^= (key >> np.int32(31)) & np.int32(0x7FFFFFFF)
+        keys[k] = (key & np.int32(-LANES)) | np.int32(k)
+        rank[k] = 0
+    for k in range(LANES):
+        if k < children and low_high[k] <= top and _points_in(within, cells, k) > 0:
+            kept += 1
+        else:
+            keys[k] = np.int32(0x7FFFFFF0) | np.int32(k)
+    for other in range(LANES):
+        key = keys[other]
+        for k in range(LANES):
+            rank[k] += np.int32(key < keys[k])
+    return kept
 
 
 @njit(error_model="numpy")
