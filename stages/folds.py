@@ -1,8 +1,8 @@
 """`make folds`: cross-validation over families, so that every object is tested once.
 
 In ``runs/<run>/folds``: the objects of the run, dealt to folds by family; ``fold-<k>`` with the
-clutters and grasps of one fold's objects alone; a network for each fold, trained on the others, its
-best epoch chosen on the next one; folds.summary.json and .md. Embedded objects beside meshes are
+clutters and grasps of one fold's objects alone; a network for each fold, trained on the others and
+measured by epoch on the next one; folds.summary.json and .md. Embedded objects beside meshes are
 dealt too and never tested on. A fold that was tested is kept in ``fold-<k>/tested.json`` until its
 grasps, configuration or code change: what was stopped goes on at the next fold.
 """

@@ -88,8 +88,8 @@ def build(stage: StageContext, ranks: Ranks = ALONE) -> Summary:
     }
     for name, data in attached.items():
         publish_bytes(stage.folder.path / "train" / name, data)
-    parameters, best = parameter_count(trained.network), trained.history[trained.best_epoch]
-    result = result_message(config.network, parameters, best, figures, tuned)
+    parameters, kept = parameter_count(trained.network), trained.history[trained.kept_epoch]
+    result = result_message(config.network, parameters, kept, figures, tuned)
     write(stage, trained, result, attached)
     inference = runtimes_ms_a_grasp(
         trained.network,
@@ -170,7 +170,7 @@ def summary(
             "test": len(figures.quality),
         },
         "epochs": len(trained.history),
-        "best_epoch": trained.best_epoch,
+        "kept_epoch": trained.kept_epoch,
         "stopped_early": trained.stopped_early,
         "val_mae": trained.val_mae,
         **figures.headline(),

@@ -85,7 +85,14 @@ class TrainConfig(Section):
         0.02, gt=0, le=1, description="error in q up to which the loss is square, then absolute"
     )
     gradient_norm_max: float = Field(1.0, gt=0, le=1e6, description="longer gradients are cut")
-    patience_epochs: int = Field(15, ge=1, description="stop after so many epochs without gain")
+    keep: Literal["last", "best"] = Field(
+        "last",
+        description="weights of the last epoch, at which the rate has come to nought, or of the "
+        "epoch of least error on val: where val has few objects, a choice by chance",
+    )
+    patience_epochs: int = Field(
+        15, ge=1, description="with keep = 'best': stop after so many epochs without gain"
+    )
     start: str = Field(
         "",
         description="weights to begin with: 'released', or a .safetensors file beside run.toml; "

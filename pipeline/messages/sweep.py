@@ -43,7 +43,7 @@ def sweep_message(member: Member, trained: TrainedNetwork, figures: MemberFigure
         test_mae_single=figures.test_mae_single,
         test_mae_averaged=figures.test_mae_averaged,
         test_mae_by_class=figures.by_class,
-        best_epoch=trained.best_epoch,
+        best_epoch=trained.kept_epoch,
         curve=[epoch_message(epoch) for epoch in trained.history],
     )
 

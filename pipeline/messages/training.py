@@ -40,7 +40,7 @@ def epoch_message(metrics: EpochMetrics) -> Epoch:
 def result_message(
     network: NetworkConfig,
     parameters: int,
-    best: EpochMetrics,
+    kept: EpochMetrics,
     figures: TestFigures,
     tuned: FineTuning | None,
 ) -> TrainingResult:
@@ -52,7 +52,7 @@ def result_message(
         Layers and channels of the trained network.
     parameters
         How many numbers it learned.
-    best
+    kept
         The epoch whose weights it has.
     figures
         Its errors on held-out objects.
@@ -68,7 +68,7 @@ def result_message(
         layers=network.layers,
         channels=network.channels,
         parameters=parameters,
-        best_epoch=best.epoch,
+        best_epoch=kept.epoch,
         test_mae=figures.mae,
         mean_predictor_mae=baselines.balanced[MEAN],
         baseline_mae=baselines.balanced,
@@ -78,7 +78,7 @@ def result_message(
         calibration=to_tensor(np.array([_numbers(row) for row in figures.calibration])),
         test_quality=to_tensor(figures.quality.astype(np.float32)),
         test_prediction=to_tensor(figures.predicted.astype(np.float32)),
-        val_mae=best.val_mae,
+        val_mae=kept.val_mae,
         test_mae_single=figures.mae_single,
         test_count_by_class=figures.count_by_class,
         train_count=figures.train_count,

@@ -80,7 +80,7 @@ class MemberFigures:
     Attributes
     ----------
     val_mae
-        Validation error of the best epoch.
+        Validation error of the kept epoch.
     val_mae_spread
         Standard error of that mean.
     test_mae

@@ -37,7 +37,7 @@ class TestedFold:
     averaged
         q̂ averaged over the symmetries, shape (n,).
     facts
-        Numbers of samples, best epoch and errors of the fold, with those of the baselines.
+        Numbers of samples, kept epoch and errors of the fold, with those of the baselines.
     """
 
     __test__ = False  # not a test case, whatever its name
@@ -137,7 +137,7 @@ def train_and_test(
             "train": len(train_set),
             "val": len(val_set),
             "test": len(samples),
-            "best_epoch": trained.best_epoch,
+            "kept_epoch": trained.kept_epoch,
             "val_mae": trained.val_mae,
             "mae_single": mean_absolute_error(single, quality),
             "baselines": baselines.balanced,

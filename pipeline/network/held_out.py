@@ -35,7 +35,7 @@ def measure_held_out(
     Parameters
     ----------
     network
-        Trained on the training samples, best epoch chosen by ``val_set``.
+        Trained on the training samples, each epoch measured on ``val_set``.
     config
         Batch size and threads to predict with; whether symmetries are averaged over.
     fitted

@@ -64,15 +64,15 @@ class TrainedNetwork:
     Attributes
     ----------
     network
-        Weights of the best epoch, on the CPU, ready to predict.
-    best_epoch
-        The epoch of the lowest validation error.
+        Weights of the epoch that ``train.keep`` names, on the CPU, ready to predict.
+    kept_epoch
+        That epoch, the first is 0.
     val_mae
-        That error.
+        Its validation error.
     history
         Every epoch, those before an interruption too.
     stopped_early
-        Whether patience ran out before the last epoch.
+        Whether patience ran out before all epochs were done.
     waiting_share
         Share of this call's time spent waiting for samples to be read; None where no step was
         taken.
@@ -81,7 +81,7 @@ class TrainedNetwork:
     """
 
     network: GaCnn
-    best_epoch: int
+    kept_epoch: int
     val_mae: float
     history: tuple[EpochMetrics, ...]
     stopped_early: bool
@@ -116,7 +116,7 @@ def train(
     train_set
         Samples to train on.
     val_set
-        Samples that the best epoch is chosen by.
+        Samples that each epoch is measured on; with ``config.keep`` "best" they choose the epoch.
     state_dir
         Folder of the resume state, seen by all processes. A state of other arguments there is
         overwritten.
@@ -135,7 +135,7 @@ def train(
 
     Returns
     -------
-    The network of the best epoch, with its history.
+    The network of the kept epoch, with its history.
 
     Raises
     ------
@@ -223,13 +223,13 @@ def train(
                 saved_at = time.monotonic()
                 on_epoch(metrics)
 
-    best = min(state.history, key=lambda metrics: metrics.val_mae)
+    kept = state.history[-1] if config.keep == "last" else _best(state.history)
     trained = build_network(network, seed)
-    trained.load_state_dict(state.best_weights)
+    trained.load_state_dict(model.state_dict() if config.keep == "last" else state.best_weights)
     return TrainedNetwork(
         network=trained.eval(),
-        best_epoch=best.epoch,
-        val_mae=best.val_mae,
+        kept_epoch=kept.epoch,
+        val_mae=kept.val_mae,
         history=tuple(state.history),
         stopped_early=len(state.history) < config.epochs,
         waiting_share=preparing.share_of(reading.waiting_s),
@@ -349,12 +349,16 @@ def _no_sums(device: torch.device) -> Float[Tensor, " 3"]:
 
 
 def _finished(history: list[EpochMetrics], config: TrainConfig) -> bool:
-    """All epochs are done, or patience ran out."""
-    if not history:
-        return False
-    best = min(history, key=lambda metrics: metrics.val_mae)
-    waited = history[-1].epoch - best.epoch >= config.patience_epochs
+    """All epochs are done, or the best one is to be kept and patience ran out."""
+    if not history or config.keep == "last":
+        return len(history) >= config.epochs
+    waited = history[-1].epoch - _best(history).epoch >= config.patience_epochs
     return waited or len(history) >= config.epochs
+
+
+def _best(history: list[EpochMetrics]) -> EpochMetrics:
+    """The epoch of the lowest validation error."""
+    return min(history, key=lambda metrics: metrics.val_mae)
 
 
 def _copied_weights(model: GaCnn) -> dict[str, Tensor]:

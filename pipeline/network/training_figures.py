@@ -82,7 +82,7 @@ class TestFigures:
     train_count
         Samples that the network was trained on.
     val_count
-        Samples that the best epoch was chosen by.
+        Samples that each epoch was measured on.
     """
 
     __test__ = False  # not a test case, whatever its name

@@ -40,7 +40,7 @@ class Training:
     validation_error
         The same over the validation split after each epoch.
     test_error
-        Mean |q̂ − q| over the test split with the weights of the best epoch.
+        Mean |q̂ − q| over the test split with the weights of the kept epoch.
     objects, lifted, attempts
         Objects that lay in the test clutters, those that the closed loop lifted, and its
         attempts, by level; empty where the closed loop was not run.

@@ -26,7 +26,7 @@ def figures_of(
     if train := summaries["train"]:
         facts = read_training(folder.artifact("train"))
         svg["curve"] = plots.training_curve(
-            facts.train_mae, facts.val_mae, train["best_epoch"], train["mean_predictor_mae"]
+            facts.train_mae, facts.val_mae, train["kept_epoch"], train["mean_predictor_mae"]
         )
         predicted, true, count = zip(*facts.calibration, strict=True)
         svg["calibration"] = plots.calibration(predicted, true, count)

@@ -31,7 +31,7 @@ def as_markdown(figures: Mapping[str, Any]) -> str:
         f"{figures['mae']:.4f} with eight averaged; of the baselines, fitted where each network "
         f"was trained: {baselines}.",
         "",
-        "| fold | trained on | best epoch chosen on | tested on | val error | test error |",
+        "| fold | trained on | measured by epoch on | tested on | val error | test error |",
         "|-|-|-|-|-|-|",
     ]
     lines += [

@@ -115,16 +115,16 @@ def _bars_by_tenth(
 
 
 def training_curve(
-    train: Sequence[float], val: Sequence[float], best_epoch: int, mean_predictor: float
+    train: Sequence[float], val: Sequence[float], kept_epoch: int, mean_predictor: float
 ) -> str:
-    """Error by epoch; epochs are counted from 1 in the figure, ``best_epoch`` from 0."""
+    """Error by epoch; epochs are counted from 1 in the figure, ``kept_epoch`` from 0."""
     with mpl.rc_context(STYLE):
         figure, (axes,) = _axes(1, 2.6)
         epochs = np.arange(len(train)) + 1
         axes.plot(epochs, train, "o-", color=rgb(PALETTE[4]), label="train", ms=3)
         axes.plot(epochs, val, "s--", color=rgb(PALETTE[5]), label="val", ms=3)
         axes.axhline(mean_predictor, color="0.4", ls=":", label="mean predictor, on test")
-        axes.axvline(best_epoch + 1, color="0.6", lw=0.8, label=f"best epoch: {best_epoch + 1}")
+        axes.axvline(kept_epoch + 1, color="0.6", lw=0.8, label=f"kept epoch: {kept_epoch + 1}")
         axes.set(xlabel="epoch", ylabel="mean |q̂ − q| [1]")
         axes.set_ylim(bottom=0)
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))

@@ -149,12 +149,36 @@ def test_stops_when_patience_runs_out_and_keeps_the_best(
     shuffled = np.random.default_rng(0).permutation(few.quality)
     noise = GraspTensors(cloud=few.cloud, mask=few.mask, quality=shuffled)
     config = TrainConfig(
-        epochs=40, batch_size=32, learning_rate=1e-2, patience_epochs=2, threads=1, device="cpu"
+        epochs=40,
+        batch_size=32,
+        learning_rate=1e-2,
+        keep="best",
+        patience_epochs=2,
+        threads=1,
+        device="cpu",
     )
     trained = train(config, NETWORK, 0, noise, held_out, tmp_path, lambda _: None)
     assert trained.stopped_early
-    assert len(trained.history) == trained.best_epoch + 1 + config.patience_epochs
+    assert len(trained.history) == trained.kept_epoch + 1 + config.patience_epochs
     assert trained.val_mae == min(metrics.val_mae for metrics in trained.history)
+    predicted = predict(trained.network, held_out.cloud, held_out.mask, 32, 1, False)
+    assert mean_absolute_error(predicted, held_out.quality) == pytest.approx(
+        trained.val_mae, abs=1e-6
+    )
+
+
+def test_keeps_the_last_epoch_whatever_its_error(
+    tmp_path: Path, few: GraspTensors, held_out: GraspTensors
+) -> None:
+    shuffled = np.random.default_rng(0).permutation(few.quality)
+    noise = GraspTensors(cloud=few.cloud, mask=few.mask, quality=shuffled)
+    config = TrainConfig(
+        epochs=20, batch_size=32, learning_rate=1e-2, patience_epochs=1, threads=1, device="cpu"
+    )
+    trained = train(config, NETWORK, 0, noise, held_out, tmp_path, lambda _: None)
+    assert trained.kept_epoch == config.epochs - 1
+    assert not trained.stopped_early
+    assert trained.val_mae > min(metrics.val_mae for metrics in trained.history)
     predicted = predict(trained.network, held_out.cloud, held_out.mask, 32, 1, False)
     assert mean_absolute_error(predicted, held_out.quality) == pytest.approx(
         trained.val_mae, abs=1e-6

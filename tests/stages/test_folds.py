@@ -19,7 +19,7 @@ from stages.folds import TESTED, fold_folder, measure, read_kept
 def fold_found(fold: int) -> TestedFold:
     q = np.array([0.25, 0.75], dtype=np.float32)
     error = ObjectError(f"mesh{fold}", 2, 0.5, 0.1 * fold, 0.1, None)
-    facts = {"train": 4, "val": 2, "test": 2, "best_epoch": 1, "val_mae": 0.1, "mae_single": 0.1}
+    facts = {"train": 4, "val": 2, "test": 2, "kept_epoch": 1, "val_mae": 0.1, "mae_single": 0.1}
     constant = {"median": 0.25}
     facts_of: dict[str, Any] = facts | {"baselines": constant, "baselines_as_proposed": constant}
     return TestedFold([error], q, q, q, facts_of)
