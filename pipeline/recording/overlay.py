@@ -117,10 +117,12 @@ def _draw_scale(
         value = (low - row) / (low - high)
         colour = tuple(int(c) for c in colours.by_value(np.array([value]))[0])
         ink.line([(left, row), (left + 22, row)], fill=colour)
-    for value in (0.0, 0.25, 0.5, 0.75, 1.0):
-        y = height_of(value)
+    marks = {value: height_of(value) for value in (0.0, 0.25, 0.5, 0.75, 1.0)}
+    for value, y in marks.items():
         ink.line([(left + 22, y), (left + 28, y)], fill=_INK)
         ink.text((left + 32, y - 8), f"{value:.2f}", font=font, fill=_INK)
     y = height_of(quality_min)
     ink.line([(left - 4, y), (left + 28, y)], fill=_INK, width=2)
-    ink.text((left + 32, y - 24), "good from here", font=ImageFont.load_default(size=11), fill=_INK)
+    # Above the line, or below it where a mark's number would be covered.
+    beside = y - 24 if min(abs(mark - (y - 16)) for mark in marks.values()) > 16 else y + 4
+    ink.text((left + 32, beside), "good from here", font=ImageFont.load_default(size=11), fill=_INK)
