@@ -95,9 +95,9 @@ def rank_by_top(
 ) -> int:
     """Order of the children by their highest z; returns how many have points below ``top``.
 
-    ``rank`` says how many of those are lower than each: the highest comes last. Children without such
-    points come after them all. Every child is compared with all others, which SIMD lanes do sooner
-    than one insertion after another.
+    ``rank`` says how many of those are lower than each: the highest comes last. Children without
+    such points come after them all. Every child is compared with all others, which SIMD lanes do
+    sooner than one insertion after another.
     """
     bits = low_high.view(np.int32)
     kept = 0
