@@ -19,6 +19,10 @@ from numba.core import caching
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
+# Makes an index unsigned in compiled loops: numba otherwise tests each for Python's negative ones,
+# which made walks over many triangles a third slower.
+unsigned = np.uint64
+
 _OURS = Path(__file__).parent
 _PLACES = ("UserProvidedCacheLocator", "InTreeCacheLocator", "UserWideCacheLocator")
 _OF_NOTEBOOKS = ("IPythonCacheLocator", "ZipCacheLocator")  # and of archives: no file of ours

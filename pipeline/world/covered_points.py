@@ -13,7 +13,7 @@ Of arrays with rows the compiler does not know that they lie apart, and uses no 
 import numpy as np
 from jaxtyping import Float, Int
 
-from pipeline.compiled_code import njit
+from pipeline.compiled_code import njit, unsigned
 from pipeline.world.point_cells import CELLS
 from pipeline.world.triangle_blocks import LANES
 
@@ -26,9 +26,6 @@ _LANE_BIT = (2.0 ** np.arange(LANES)).astype(np.float32)
 # Lane of a power of two by its rest modulo 19, which differs for each power below 2^18.
 _LANE_OF = np.zeros(19, dtype=np.int64)
 _LANE_OF[[(1 << lane) % 19 for lane in range(LANES)]] = np.arange(LANES)
-# Indices are converted to unsigned numbers: numba otherwise tests each for Python's negative ones,
-# which made this a third slower.
-_at = np.uint64
 
 
 # Sums in any order and fused products are safe in bounds: they have room.
@@ -148,9 +145,11 @@ def points_within(
     if first >= last:
         return 0
     for line in range(bottom, end):
-        for point in range(rows[_at(line), _at(first)], rows[_at(line), _at(last)]):
-            i = _at(point)
-            point_at[_at(count)] = point
+        for point in range(
+            rows[unsigned(line), unsigned(first)], rows[unsigned(line), unsigned(last)]
+        ):
+            i = unsigned(point)
+            point_at[unsigned(count)] = point
             count += (
                 (x[i] >= left)
                 & (x[i] <= right)
@@ -175,10 +174,10 @@ def near_points(
     many."""
     found = 0
     for number in range(points):
-        point = point_at[_at(number)]
-        i = _at(point)
+        point = point_at[unsigned(number)]
+        i = unsigned(point)
         lanes = _may_cover(edges, x[i], y[i], so_far[i])
-        point_at[_at(found)], found_lanes[_at(found)] = point, lanes
+        point_at[unsigned(found)], found_lanes[unsigned(found)] = point, lanes
         found += lanes != 0
     return found
 
@@ -210,12 +209,12 @@ def pairs_of(
     """Each point with each lane that may cover it; returns how many."""
     pairs = 0
     for number in range(found):
-        lanes = found_lanes[_at(number)]
+        lanes = found_lanes[unsigned(number)]
         while lanes != 0:
             bit = lanes & (np.uint32(0) - lanes)
             lanes ^= bit
-            pair_at[_at(pairs)] = found_at[_at(number)]
-            pair_lane[_at(pairs)] = _LANE_OF[_at(bit % np.uint32(19))]
+            pair_at[unsigned(pairs)] = found_at[unsigned(number)]
+            pair_lane[unsigned(pairs)] = _LANE_OF[unsigned(bit % np.uint32(19))]
             pairs += 1
     return pairs
 
@@ -242,7 +241,7 @@ def draw_pairs(
     longer than all of its arithmetic.
     """
     for pair in range(pairs):
-        i, k = _at(pair_at[_at(pair)]), _at(pair_lane[_at(pair)])
+        i, k = unsigned(pair_at[unsigned(pair)]), unsigned(pair_lane[unsigned(pair)])
         a_x, a_y = seen[k] - x[i], seen[LANES + k] - y[i]
         b_x, b_y = seen[3 * LANES + k] - x[i], seen[4 * LANES + k] - y[i]
         c_x, c_y = seen[6 * LANES + k] - x[i], seen[7 * LANES + k] - y[i]
@@ -252,7 +251,7 @@ def draw_pairs(
         z = (of_a * a_z + of_b * b_z + of_c * c_z) / whole
         z = min(max(z, min(min(a_z, b_z), c_z)), max(max(a_z, b_z), c_z))
         inside = (min(min(of_a, of_b), of_c) >= 0.0) | (max(max(of_a, of_b), of_c) <= 0.0)
-        point = _at(order[i])
+        point = unsigned(order[i])
         if inside & (whole != 0.0) & (z <= top) & (z > height[point]):
             height[point], so_far[i] = z, np.float32(z)
             body[point] = number

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
-from pipeline.compiled_code import njit
+from pipeline.compiled_code import njit, unsigned
 from pipeline.world.covered_points import (
     SINGLE,
     around_block,
@@ -30,9 +30,6 @@ from pipeline.world.triangle_blocks import LANES, TriangleBlocks
 _WAITING = 512
 # A frame whose volume is farther from 1 is no pose.
 _SKEW = 1e-3
-# Indices are converted to unsigned numbers: numba otherwise tests each for Python's negative ones,
-# which made this a third slower.
-_at = np.uint64
 
 
 @dataclass(frozen=True, eq=False)
@@ -285,7 +282,9 @@ def _hidden(
 ) -> bool:
     """Whether all points in a rectangle of cells have something higher than ``top``."""
     for y in range(cells[2], cells[3]):
-        for i in range(rows[_at(y), _at(cells[0])], rows[_at(y), _at(cells[1])]):
-            if so_far[_at(i)] <= top:
+        for i in range(
+            rows[unsigned(y), unsigned(cells[0])], rows[unsigned(y), unsigned(cells[1])]
+        ):
+            if so_far[unsigned(i)] <= top:
                 return False
     return True

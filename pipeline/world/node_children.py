@@ -7,13 +7,9 @@ Arrays of lanes are flat: sixteen numbers for the sixteen children, then sixteen
 import numpy as np
 from jaxtyping import Float, Int
 
-from pipeline.compiled_code import njit
+from pipeline.compiled_code import njit, unsigned
 from pipeline.world.point_cells import CELLS
 from pipeline.world.triangle_blocks import LANES
-
-# Indices are converted to unsigned numbers: numba otherwise tests each for Python's negative ones,
-# which made this a third slower.
-_at = np.uint64
 
 
 @njit(error_model="numpy")
@@ -93,11 +89,11 @@ def rank_by_top(
     keys: Int[np.ndarray, " 16"],
     rank: Int[np.ndarray, " 16"],
 ) -> int:
-    """Order of the children by their highest z; returns how many have points below ``top``.
+    """Write each child's place into ``rank``: the higher its highest z, the later its place.
 
-    ``rank`` says how many of those are lower than each: the highest comes last. Children without
-    such points come after them all. Every child is compared with all others, which SIMD lanes do
-    sooner than one insertion after another.
+    Children whose cells hold no point, or that lie wholly above ``top``, have places after all
+    others. Returns how many the others are. Each child is compared with every other one, which SIMD
+    lanes do sooner than one insertion after another.
     """
     bits = low_high.view(np.int32)
     kept = 0
@@ -123,10 +119,10 @@ def rank_by_top(
 def _points_in(within: Int[np.ndarray, "more more"], cells: Int[np.ndarray, " 64"], k: int) -> int:
     """Points in the rectangle of cells of lane k; 0 where the rectangle is empty."""
     left, right, low, high = (
-        _at(cells[k]),
-        _at(cells[LANES + k]),
-        _at(cells[2 * LANES + k]),
-        _at(cells[3 * LANES + k]),
+        unsigned(cells[k]),
+        unsigned(cells[LANES + k]),
+        unsigned(cells[2 * LANES + k]),
+        unsigned(cells[3 * LANES + k]),
     )
     if left >= right or low >= high:
         return 0
