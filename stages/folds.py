@@ -2,9 +2,9 @@
 
 In ``runs/<run>/folds``: the objects of the run, dealt to folds by family; ``fold-<k>`` with the
 clutters and grasps of one fold's objects alone; a network for each fold, trained on the others and
-measured by epoch on the next one; folds.summary.json and .md. Embedded objects beside meshes are
-dealt too and never tested on. A fold that was tested is kept in ``fold-<k>/tested.json`` until its
-grasps, configuration or code change: what was stopped goes on at the next fold.
+measured after each epoch on the next; folds.summary.json and .md. Embedded objects beside meshes
+are dealt too and never tested on. A fold that was tested is kept in ``fold-<k>/tested.json`` until
+its grasps, configuration or code change: what was stopped goes on at the next fold.
 """
 
 import hashlib

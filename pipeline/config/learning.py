@@ -87,8 +87,8 @@ class TrainConfig(Section):
     gradient_norm_max: float = Field(1.0, gt=0, le=1e6, description="longer gradients are cut")
     keep: Literal["last", "best"] = Field(
         "last",
-        description="weights of the last epoch, at which the rate has come to nought, or of the "
-        "epoch of least error on val: where val has few objects, a choice by chance",
+        description="epoch whose weights become the network: the last one, when the rate has "
+        "fallen to zero, or that of least error on val, a choice by chance where objects are few",
     )
     patience_epochs: int = Field(
         15, ge=1, description="with keep = 'best': stop after so many epochs without gain"

@@ -25,8 +25,8 @@ class TrainingState:
     ----------
     history
         The finished epochs.
-    best_weights
-        Weights of the epoch with the lowest validation error; initial ones before any.
+    kept_weights
+        Weights of the finished epoch that is to be kept; initial ones before any.
     batch
         Batches done of the current epoch.
     sums
@@ -34,7 +34,7 @@ class TrainingState:
     """
 
     history: list[EpochMetrics]
-    best_weights: dict[str, Tensor]
+    kept_weights: dict[str, Tensor]
     batch: int
     sums: Float[Tensor, " 3"]
 
@@ -58,7 +58,7 @@ def save_training_state(
         How far the training has come.
     """
     tensors = {f"model/{name}": tensor for name, tensor in model.state_dict().items()}
-    tensors |= {f"best/{name}": tensor for name, tensor in state.best_weights.items()}
+    tensors |= {f"kept/{name}": tensor for name, tensor in state.kept_weights.items()}
     tensors["sums"] = state.sums
     for name, parameter in model.named_parameters():
         for key, tensor in optimizer.state[parameter].items():
@@ -104,9 +104,9 @@ def load_training_state(
     try:
         state = TrainingState(
             history=[EpochMetrics(**past) for past in json.loads(metadata["history"])],
-            best_weights={
-                name: torch.zeros_like(given).copy_(tensors[f"best/{name}"])
-                for name, given in fresh.best_weights.items()
+            kept_weights={
+                name: torch.zeros_like(given).copy_(tensors[f"kept/{name}"])
+                for name, given in fresh.kept_weights.items()
             },
             batch=int(metadata["batch"]),
             sums=tensors["sums"].to(fresh.sums.device),

@@ -51,7 +51,7 @@ from pipeline.network.training_figures import EpochMetrics
 from pipeline.progress import progress
 
 # Rises whenever the loop changes what it computes: a state of another version is not continued.
-STATE_VERSION = 2
+STATE_VERSION = 3
 SAVE_EVERY_S = 120.0  # what a kill may cost; a state of 52 layers takes a third of a second
 
 Batch = tuple[Float[Tensor, "b c h w"], Float[Tensor, " b"]]
@@ -214,18 +214,18 @@ def train(
                 val_mae=_mean_absolute_error(model, val_set, config.batch_size, device, ranks),
                 samples=round(seen),
             )
-            if metrics.val_mae < min((past.val_mae for past in state.history), default=math.inf):
-                state.best_weights = _copied_weights(model)
             state.history.append(metrics)
+            if _kept(state.history, config) is metrics:
+                state.kept_weights = _copied_weights(model)
             state.batch, state.sums = 0, _no_sums(device)
             if ranks.first:
                 save_training_state(state_path, identity, model, optimizer, state)
                 saved_at = time.monotonic()
                 on_epoch(metrics)
 
-    kept = state.history[-1] if config.keep == "last" else _best(state.history)
+    kept = _kept(state.history, config)
     trained = build_network(network, seed)
-    trained.load_state_dict(model.state_dict() if config.keep == "last" else state.best_weights)
+    trained.load_state_dict(state.kept_weights)
     return TrainedNetwork(
         network=trained.eval(),
         kept_epoch=kept.epoch,
@@ -349,15 +349,17 @@ def _no_sums(device: torch.device) -> Float[Tensor, " 3"]:
 
 
 def _finished(history: list[EpochMetrics], config: TrainConfig) -> bool:
-    """All epochs are done, or the best one is to be kept and patience ran out."""
-    if not history or config.keep == "last":
-        return len(history) >= config.epochs
-    waited = history[-1].epoch - _best(history).epoch >= config.patience_epochs
+    """All epochs are done, or patience ran out."""
+    if not history:
+        return False
+    waited = history[-1].epoch - _kept(history, config).epoch >= config.patience_epochs
     return waited or len(history) >= config.epochs
 
 
-def _best(history: list[EpochMetrics]) -> EpochMetrics:
-    """The epoch of the lowest validation error."""
+def _kept(history: list[EpochMetrics], config: TrainConfig) -> EpochMetrics:
+    """The epoch whose weights would be the network's if training ended now."""
+    if config.keep == "last":
+        return history[-1]
     return min(history, key=lambda metrics: metrics.val_mae)
 
 
