@@ -79,7 +79,8 @@ def test_heights_and_bodies_are_those_of_rays(seed: int, kind: str) -> None:
     table = mesh_of(trimesh.creation.box((1.0, 1.0, 0.001)))
     body = mesh_of(shape)
     scene = RayScene([body, Mesh(table.vertices_m - [0.0, 0.0, 0.1], table.faces)], [3, 1])
-    assert_as_rays(scene, frames_on(body, 8, seed))
+    # Enough for the share: of eight, one in a hundred seeds has five points at edges.
+    assert_as_rays(scene, frames_on(body, 32, seed))
 
 
 def test_no_point_falls_between_triangles_seen_at_their_corners() -> None:
