@@ -5,13 +5,15 @@ clutters and grasps of one fold's objects alone; a network for each fold, traine
 measured after each epoch on the next; folds.summary.json and .md. Embedded objects beside meshes
 are dealt too and never tested on. A fold that was tested is kept in ``fold-<k>/tested.json`` until
 its grasps, configuration or code change: what was stopped goes on at the next fold.
+
+With ``folds.start`` every fold begins with the network of a run that held out all meshes.
 """
 
 import hashlib
 import json
 import sys
 import time
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -23,12 +25,17 @@ from pipeline.artifacts import ArtifactWriter, publish_bytes, read_provenance
 from pipeline.config import RunConfig, load_run_config
 from pipeline.config.judged import folds_config
 from pipeline.config.written import as_toml
+from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder, generator, run_command
 from pipeline.execution.code import code_digests
-from pipeline.geometry.folds import deal_families
+from pipeline.geometry.folds import check_held_out, deal_families
 from pipeline.geometry.parametric import PARAMETRIC_OBJECTS
 from pipeline.messages.objects import TOPIC, object_message, read_objects
+from pipeline.messages.training import CHECKPOINT
+from pipeline.network.checkpoint import save_checkpoint_bytes
+from pipeline.network.fine_tuning import starting_network
 from pipeline.network.folds import TestedFold, figures_of_folds, train_and_test
+from pipeline.network.ga_cnn import GaCnn
 from pipeline.reporting.folds import as_markdown
 from stages.graph import RUNS_DIR
 from stages.holdout import labelled
@@ -92,19 +99,22 @@ def measure(run: RunName = "default", folds: Folds = FOLDS, runs_dir: RunsDir = 
     objects = read_objects(folder.artifact("objects"))
     families = {name: item.family for name, (item, _) in objects.items()}
     parts = [labelled(fold_folder(folder, fold)) for fold in range(folds)]
+    contents = {name: objects[name][0].content for name in tested(objects)}
+    start = starting(config, contents, runs_dir)
     done = []
     for fold in range(folds):
         logger.info("folds: fold {} of {}", fold, folds)
-        own, key = fold_folder(folder, fold), key_of(folder, fold, folds)
+        own, key = fold_folder(folder, fold), key_of(folder, fold, folds, start)
         if (kept := read_kept(own, key)) is None:
             state = own.state("train")
-            kept = train_and_test(config, parts, fold, tested(objects), state, print_epoch)
+            kept = train_and_test(config, parts, fold, tested(objects), state, print_epoch, start)
             text = json.dumps({"key": key, "tested": kept.to_json()})
             publish_bytes(own.path / TESTED, text.encode())
         done.append(kept)
     rng = generator(config.seed, NAME)
     figures = figures_of_folds(done, families, config.folds.resamples, rng) | {
         "layers": config.network.layers,
+        "start": config.folds.start,
         "wall_time_s": time.perf_counter() - began,
     }
     text, summary = as_markdown(figures), json.dumps(figures, indent=1) + "\n"
@@ -113,10 +123,31 @@ def measure(run: RunName = "default", folds: Folds = FOLDS, runs_dir: RunsDir = 
     sys.stdout.write(text)
 
 
-def key_of(folder: RunFolder, fold: int, folds: int) -> str:
-    """What the test of a fold depends on: the grasps of all folds, configuration and code."""
+def starting(config: RunConfig, contents: Mapping[str, str], runs_dir: Path) -> GaCnn | None:
+    """The network of the run that ``folds.start`` names, which learned from none of these objects.
+
+    contents: name and content of each object that is tested.
+    """
+    if not config.folds.start:
+        return None
+    run = RunFolder(runs_dir / config.folds.start)
+    known = read_objects(run.artifact("objects")).values()
+    split_of = {item.content: split for item, split in known}
+    check_held_out(contents, split_of, config.folds.start)
+    path = run.path / "train" / CHECKPOINT
+    if not path.is_file():
+        raise ArtifactError(
+            f"{path} is missing, and folds.start names its run",
+            f"Train it: make train RUN={config.folds.start}",
+        )
+    return starting_network(path.read_bytes(), str(path), config.network)
+
+
+def key_of(folder: RunFolder, fold: int, folds: int, start: GaCnn | None) -> str:
+    """What the test of a fold depends on: all grasps, configuration, code and first weights."""
+    begun = hashlib.sha256(save_checkpoint_bytes(start)).hexdigest() if start else None
     made = [read_provenance(fold_folder(folder, k).artifact("grasps")).key for k in range(folds)]
-    text = json.dumps([fold, made, folder.config.read_text(), code_digests(TRAINED_BY)])
+    text = json.dumps([fold, made, folder.config.read_text(), code_digests(TRAINED_BY), begun])
     return hashlib.sha256(text.encode()).hexdigest()
 
 

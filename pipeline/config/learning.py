@@ -128,6 +128,11 @@ class TrainConfig(Section):
     device: Literal["auto", "cpu", "cuda"] = Field(
         "auto", description="'auto' takes a GPU where there is one"
     )
+    compiled: bool = Field(
+        False,
+        description="compile the network before the first step: a minute, a C++ compiler and more "
+        "samples a second; of one process",
+    )
 
 
 class LoadingConfig(Section):

@@ -131,6 +131,10 @@ class SplitConfig(Section):
     all_in_test: bool = Field(
         False, description="every object is of the test split: nothing is trained; make holdout"
     )
+    meshes_in_training: bool = Field(
+        True,
+        description="False: meshes are for val and test, training has the random solids alone",
+    )
     # Measured on 47 scans and 65 embedded shapes: from 0.035 to 0.040 the families are the same
     # (balls; cubes; cans; lemon and peach; screwdrivers; ...), at 0.05 balls and cubes are one.
     family_threshold: float = Field(

@@ -134,6 +134,17 @@ class RunConfig(Section):
         return self
 
     @model_validator(mode="after")
+    def _something_is_trained_on(self) -> Self:
+        if self.split.meshes_in_training:
+            return self
+        if self.objects.embedded_in_training or not self.objects.random_solids:
+            raise ValueError(
+                "split.meshes_in_training = false leaves random solids alone for training: set "
+                "objects.random_solids to some hundreds, and objects.embedded_in_training = false"
+            )
+        return self
+
+    @model_validator(mode="after")
     def _clouds_show_what_labels_meet(self) -> Self:
         if self.sensing.grid_height_rg < self.grasps.clearance_rg:
             raise ValueError(

@@ -1,4 +1,4 @@
-"""Which fold of a cross-validation each family of objects belongs to."""
+"""Which fold of a cross-validation each family of objects belongs to, and what a start may know."""
 
 from collections import Counter
 from collections.abc import Collection, Mapping
@@ -69,3 +69,31 @@ def deal_families(
         fold = min(range(folds), key=lambda k: load[k] if counted[family] else load[k][::-1])
         fold_of |= dict.fromkeys(members[family], fold)
     return fold_of
+
+
+def check_held_out(tested: Mapping[str, str], split_of: Mapping[str, str], run: str) -> None:
+    """Hold that a network learned from none of the objects that it is to be tested on.
+
+    Parameters
+    ----------
+    tested
+        Name and content of each object that a fold is tested on.
+    split_of
+        Content and split of each object of the run that trained the network.
+    run
+        Name of that run.
+
+    Raises
+    ------
+    ConfigError
+        The run trained on one of them, or does not know one: what is near it in shape may then
+        have been trained on.
+    """
+    for name, content in sorted(tested.items()):
+        if split_of.get(content) in ("val", "test"):
+            continue
+        why = "was trained on" if content in split_of else "is unknown"
+        raise ConfigError(
+            f"Run {run}, which folds.start names, has not held out {name}: it {why} there",
+            f"Make run {run} of the same meshes with split.meshes_in_training = false",
+        )

@@ -54,4 +54,6 @@ def split_objects(
         if item.source.name in families.of and item.source.name not in added
     }
     split = choose_split(classes, config, seed, families.of, fixed)
+    if not config.meshes_in_training:
+        split = {name: "test" if where == "train" else where for name, where in split.items()}
     return split | {name: fixed[name] for name in added}, families

@@ -13,6 +13,7 @@ from pipeline.config import RunConfig
 from pipeline.network.by_object import ObjectError, errors_by_object, interval_of_mean
 from pipeline.network.figures import mean_absolute_error
 from pipeline.network.fitted_baselines import baseline_errors, fit_baselines
+from pipeline.network.ga_cnn import GaCnn
 from pipeline.network.inference import predict
 from pipeline.network.samples import Samples, join_samples
 from pipeline.network.training import train
@@ -69,8 +70,9 @@ def train_and_test(
     tested: Collection[str],
     state_dir: Path,
     on_epoch: Callable[[EpochMetrics], None],
+    start: GaCnn | None = None,
 ) -> TestedFold:
-    """Train on all folds but this and the next, choose the epoch on the next, predict this one.
+    """Train on all folds but this and the next, measure epochs on the next, predict this one.
 
     Parameters
     ----------
@@ -86,6 +88,8 @@ def train_and_test(
         Folder of the resume state.
     on_epoch
         Called after each epoch.
+    start
+        A network that saw nothing of any fold, to begin with; None: weights drawn from the seed.
 
     Returns
     -------
@@ -111,6 +115,7 @@ def train_and_test(
         state_dir,
         on_epoch,
         show_progress=True,
+        start=start,
     )
     of_tested = np.isin(np.array(names)[samples.object_index], sorted(tested))
     samples = samples.take(np.flatnonzero(of_tested))

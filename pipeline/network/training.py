@@ -13,6 +13,8 @@ takes, up to rounding.
 import hashlib
 import json
 import math
+import os
+import shutil
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -25,7 +27,7 @@ from torch import Tensor, nn
 from torch.nn.parallel import DistributedDataParallel
 
 from pipeline.config.learning import NetworkConfig, TrainConfig
-from pipeline.errors import MachineError
+from pipeline.errors import ConfigError, MachineError
 from pipeline.network.canonical import apply_symmetry, network_input
 from pipeline.network.checkpoint import save_checkpoint_bytes
 from pipeline.network.ga_cnn import GaCnn, build_network
@@ -140,9 +142,10 @@ def train(
     Raises
     ------
     ConfigError
-        ``network`` names no member of the family, or batches are too small to divide.
+        ``network`` names no member of the family, batches are too small to divide, or several
+        processes are to train a compiled network.
     MachineError
-        ``config.device`` asks for a GPU and there is none.
+        ``config.device`` asks for a GPU and there is none, or ``config.compiled`` for a compiler.
     ArtifactError
         The resume state is damaged.
     """
@@ -163,6 +166,8 @@ def train(
         forward: nn.Module = model
         if ranks.count > 1:
             forward = DistributedDataParallel(model, forward_sync_buffers=False)
+        if config.compiled:
+            forward = compile_network(model, device, ranks)
 
         batches_per_epoch = batch_count(len(train_set), config.batch_size)
         total_steps = config.epochs * batches_per_epoch
@@ -311,6 +316,46 @@ def choose_device(wanted: str, ranks: Ranks) -> torch.device:
     return (
         torch.device("cuda", ranks.local) if available and wanted != "cpu" else torch.device("cpu")
     )
+
+
+def compile_network(model: GaCnn, device: torch.device, ranks: Ranks) -> nn.Module:
+    """The same network, its steps joined by PyTorch's compiler; equal to it up to rounding.
+
+    Parameters
+    ----------
+    model
+        The network; the result has its very weights.
+    device
+        Where it lies.
+    ranks
+        Processes that train together.
+
+    Returns
+    -------
+    The network as it is called in training. It is compiled when it is first called.
+
+    Raises
+    ------
+    ConfigError
+        More than one process trains: their shared norms are no part of one network.
+    MachineError
+        There is no C++ compiler.
+    """
+    if ranks.count > 1:
+        raise ConfigError(
+            f"train.compiled is for one process, and {ranks.count} train together",
+            "Set train.compiled = false, or train without RANKS",
+        )
+    compiler = os.environ.get("CXX", "g++")  # what PyTorch looks for
+    if device.type == "cpu" and shutil.which(compiler) is None:
+        raise MachineError(
+            f"train.compiled needs a C++ compiler, and there is no {compiler}",
+            "Install g++ or name one in CXX, or set train.compiled = false",
+        )
+    # Batches have two sizes at most: each gets a program of its own, which is quicker than one of
+    # any size.
+    compiled: nn.Module = torch.compile(model, dynamic=False)
+    return compiled
 
 
 def mixed_precision(device: torch.device) -> torch.autocast:

@@ -12,10 +12,15 @@ def as_markdown(figures: Mapping[str, Any]) -> str:
     baselines = ", ".join(
         f"{TITLES[name]} {error:.4f}" for name, error in figures["baselines"].items()
     )
+    begun = (
+        f", trained on from run {figures['start']}, which held out every mesh"
+        if figures["start"]
+        else ""
+    )
     lines = [
         f"{figures['objects']} objects of {figures['families']} families in {figures['folds']} "
         f"folds, each tested once by a network of {figures['layers']} layers that saw no family of "
-        f"its fold; {figures['grasps']} grasps, one prediction each.",
+        f"its fold{begun}; {figures['grasps']} grasps, one prediction each.",
         "",
         "| mean over objects of \\|q-hat - q\\| | objects | error | 95 % interval |",
         "|-|-|-|-|",

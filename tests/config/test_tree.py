@@ -187,3 +187,13 @@ def test_grasps_are_shared_out_or_are_a_scenes(
     if per_scene:
         own = GraspsConfig(count=count, per_scene=per_scene, portions=portions).of_scenes(scenes)
         assert own == [[per_scene] * portions] * scenes
+
+
+def test_where_no_mesh_is_trained_on_random_solids_must_be() -> None:
+    held_out = {"split": {"meshes_in_training": False}}
+    with pytest.raises(ValidationError, match="leaves random solids alone for training"):
+        RunConfig.model_validate(held_out)
+    both = {"random_solids": 9, "embedded_in_training": True}
+    with pytest.raises(ValidationError, match="embedded_in_training = false"):
+        RunConfig.model_validate(held_out | {"objects": both})
+    RunConfig.model_validate(held_out | {"objects": {"random_solids": 9}})

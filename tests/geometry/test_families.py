@@ -108,3 +108,15 @@ def test_where_nothing_is_trained_every_object_is_for_test() -> None:
         split, families = split_objects(items, (), (), config, 0, Settled("x"))
         assert split == {item.source.name: "test" for item in items}
         assert not families.joining
+
+
+def test_where_meshes_are_held_out_none_is_trained_on_and_families_stay_whole() -> None:
+    config = SplitConfig(meshes_in_training=False)
+    for seed in range(10):
+        split, families = split_objects(
+            [BALL, SMALL_BALL, CUBE, PLATE, ROD], (), (), config, seed, Settled("x")
+        )
+        assert set(split) == {"ball", "small_ball", "cube", "plate", "rod"}
+        assert set(split.values()) <= {"val", "test"}
+        assert split["ball"] == split["small_ball"]
+        assert not families.joining

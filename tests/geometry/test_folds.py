@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.errors import ConfigError
-from pipeline.geometry.folds import deal_families
+from pipeline.geometry.folds import check_held_out, deal_families
 from pipeline.geometry.shape import ShapeClass
 
 KINDS = list(ShapeClass)
@@ -41,3 +41,11 @@ def test_each_class_is_spread_evenly() -> None:
     for kind in KINDS:
         of_kind = [fold[name] for name in names if classes[name] is kind]
         assert sorted(of_kind) == [0, 0, 1, 1, 2, 2, 3, 3]
+
+
+def test_a_start_must_have_held_out_all_that_is_tested() -> None:
+    tested = {"mug": "a", "bowl": "b"}
+    check_held_out(tested, {"a": "test", "b": "val", "c": "train"}, "solids")
+    for known, why in (({"a": "test", "b": "train"}, "was trained on"), ({"a": "val"}, "unknown")):
+        with pytest.raises(ConfigError, match=f"solids.*held out bowl: it .*{why}"):
+            check_held_out(tested, known, "solids")

@@ -10,6 +10,7 @@ from pipeline.config import RunConfig
 from pipeline.config.learning import NetworkConfig, TrainConfig
 from pipeline.network import folds
 from pipeline.network.folds import Part, figures_of_folds, train_and_test
+from pipeline.network.ga_cnn import build_network
 from pipeline.network.samples import Samples
 from pipeline.network.training import TrainedNetwork, train
 from tests.network.planes import planes_with_holes
@@ -36,6 +37,22 @@ def part(fold: int) -> Part:
         pictures=np.ones(24, dtype=np.int64),
     )
     return (f"a{fold}", f"b{fold}", f"embedded{fold}"), samples
+
+
+def test_a_fold_begins_with_the_network_that_is_given(tmp_path: Path) -> None:
+    parts = [part(fold) for fold in range(3)]
+    still = CONFIG.model_copy(
+        update={"train": CONFIG.train.model_copy(update={"learning_rate": 1e-12})}
+    )
+    start = build_network(CONFIG.network, 5)
+    found = {
+        name: train_and_test(
+            still, parts, 0, {"a0", "b0"}, tmp_path / name, lambda _: None, given
+        ).facts["val_mae"]
+        for name, given in (("given", start), ("drawn", None))
+    }
+    again = train_and_test(still, parts, 0, {"a0"}, tmp_path / "again", lambda _: None, start)
+    assert again.facts["val_mae"] == found["given"] != found["drawn"]
 
 
 def test_every_object_is_tested_once_by_a_network_of_other_folds(

@@ -1,26 +1,36 @@
 """A network learns what it can, repeats itself to the bit, and survives a kill."""
 
 import itertools
+import json
 import math
+import os
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+import torch
 
 from pipeline.config.learning import NetworkConfig, TrainConfig
-from pipeline.errors import ArtifactError
+from pipeline.errors import ArtifactError, ConfigError, MachineError
 from pipeline.network import training
 from pipeline.network.baselines import mean_predictor_mae
 from pipeline.network.checkpoint import save_checkpoint_bytes
 from pipeline.network.figures import mean_absolute_error
+from pipeline.network.ga_cnn import build_network
 from pipeline.network.inference import predict
+from pipeline.network.parallel import ALONE, Ranks
 from pipeline.network.resuming import STATE_FILE, save_training_state
 from pipeline.network.samples import GraspTensors
-from pipeline.network.training import TrainedNetwork, learning_rate_at, train
+from pipeline.network.training import TrainedNetwork, compile_network, learning_rate_at, train
 from pipeline.network.training_figures import EpochMetrics
+from tests.checked_shapes import VARIABLE as CHECKS
 from tests.network.planes import planes_with_holes
 
+ROOT = Path(__file__).resolve().parents[2]
 NETWORK = NetworkConfig(layers=18, channels=(16, 16, 32, 32))
 SHORT = TrainConfig(epochs=3, batch_size=32, threads=1, device="cpu")
 
@@ -193,3 +203,31 @@ def test_learning_rate_rises_then_falls_and_never_is_zero() -> None:
     assert all(late < early for early, late in itertools.pairwise(rates[20:]))
     assert rates[60] == pytest.approx(0.5 * (1 + math.cos(math.pi * 0.5)))
     assert min(rates) > 0
+
+
+@pytest.mark.skipif(shutil.which("g++") is None, reason="there is no g++ to compile with")
+def test_a_compiled_network_trains_as_the_plain_one(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.network.train_compiled", str(tmp_path)],
+        cwd=ROOT,
+        env={name: value for name, value in os.environ.items() if name != CHECKS},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=600,
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    plain, compiled = json.loads(done.stdout.splitlines()[-1])
+    assert compiled["train_loss"] == pytest.approx(plain["train_loss"], rel=1e-3)
+    assert compiled["val_mae"] == pytest.approx(plain["val_mae"], rel=1e-2)
+    # No wrapper's names are in what is kept.
+    assert compiled["weights"] == plain["weights"]
+
+
+def test_what_a_compiled_network_needs_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    network, cpu = build_network(NETWORK, 0), torch.device("cpu")
+    with pytest.raises(ConfigError, match=r"train.compiled is for one process, and 2"):
+        compile_network(network, cpu, Ranks(0, 2, 0))
+    monkeypatch.setenv("CXX", "no-such-compiler")
+    with pytest.raises(MachineError, match="there is no no-such-compiler"):
+        compile_network(network, cpu, ALONE)

@@ -10,10 +10,14 @@ import pytest
 import stages.folds
 from pipeline.config import RunConfig
 from pipeline.config.judged import folds_config, holdout_config
+from pipeline.errors import ArtifactError, ConfigError
 from pipeline.execution import RunFolder
+from pipeline.messages.training import CHECKPOINT
 from pipeline.network.by_object import ObjectError
+from pipeline.network.checkpoint import save_checkpoint_bytes
 from pipeline.network.folds import TestedFold
-from stages.folds import TESTED, fold_folder, measure, read_kept
+from pipeline.network.ga_cnn import build_network
+from stages.folds import TESTED, fold_folder, measure, read_kept, starting
 
 
 def fold_found(fold: int) -> TestedFold:
@@ -41,11 +45,14 @@ def test_a_fold_that_was_tested_is_not_trained_again(
             raise KeyboardInterrupt
         return fold_found(fold)
 
-    objects = {f"mesh{k}": (SimpleNamespace(family=f"family {k}"), "test") for k in range(3)}
+    objects = {
+        f"mesh{k}": (SimpleNamespace(family=f"family {k}", content=f"{k}"), "test")
+        for k in range(3)
+    }
     monkeypatch.setattr(stages.folds, "labelled", lambda folder: ((), None))
     monkeypatch.setattr(stages.folds, "read_objects", lambda path: objects)
     monkeypatch.setattr(stages.folds, "train_and_test", train)
-    monkeypatch.setattr(stages.folds, "key_of", lambda folder, fold, folds: f"{key} {fold}")
+    monkeypatch.setattr(stages.folds, "key_of", lambda folder, fold, folds, start: f"{key} {fold}")
     with pytest.raises(KeyboardInterrupt):
         measure("small", 3, tmp_path)
     assert not folder.summary("folds").exists()
@@ -73,3 +80,25 @@ def test_files_beside_the_runs_own_run_toml_are_found_from_within() -> None:
     assert dealt.split.families == "../../paper/families.toml"
     # The meshes of a holdout are others.
     assert holdout_config(config).objects.masses == ""
+
+
+def test_folds_begin_with_a_run_that_held_out_the_meshes_and_with_no_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = RunConfig.model_validate({"folds": {"start": "solids"}})
+    own = {"mug": "a"}
+    known: dict[str, Any] = {"cup": (SimpleNamespace(content="a"), "train")}
+    monkeypatch.setattr(stages.folds, "read_objects", lambda path: known)
+    with pytest.raises(ConfigError, match="has not held out mug"):
+        starting(config, own, tmp_path)
+    known["cup"] = (known["cup"][0], "test")
+    with pytest.raises(ArtifactError, match=r"is missing, and folds\.start names"):
+        starting(config, own, tmp_path)
+    network = build_network(config.network, 3)
+    path = tmp_path / "solids" / "train" / CHECKPOINT
+    path.parent.mkdir(parents=True)
+    path.write_bytes(save_checkpoint_bytes(network))
+    started = starting(config, own, tmp_path)
+    assert started is not None
+    assert save_checkpoint_bytes(started) == path.read_bytes()
+    assert starting(RunConfig(), own, tmp_path) is None
