@@ -57,6 +57,7 @@ STATE_VERSION = 3
 SAVE_EVERY_S = 120.0  # what a kill may cost; a state of 52 layers takes a third of a second
 
 Batch = tuple[Float[Tensor, "b c h w"], Float[Tensor, " b"]]
+Predict = Callable[[Float[Tensor, "b c h w"]], Float[Tensor, " b"]]  # canonical inputs to q-hat
 
 
 @dataclass(frozen=True)
@@ -163,7 +164,7 @@ def train(
         state_path = state_dir / STATE_FILE
         if state_path.exists():
             state = load_training_state(state_path, identity, model, optimizer, state)
-        forward: nn.Module = model
+        forward: Predict = model
         if ranks.count > 1:
             forward = DistributedDataParallel(model, forward_sync_buffers=False)
         if config.compiled:
@@ -318,7 +319,7 @@ def choose_device(wanted: str, ranks: Ranks) -> torch.device:
     )
 
 
-def compile_network(model: GaCnn, device: torch.device, ranks: Ranks) -> nn.Module:
+def compile_network(model: GaCnn, device: torch.device, ranks: Ranks) -> Predict:
     """The same network, its steps joined by PyTorch's compiler; equal to it up to rounding.
 
     Parameters
@@ -354,7 +355,7 @@ def compile_network(model: GaCnn, device: torch.device, ranks: Ranks) -> nn.Modu
         )
     # Batches have two sizes at most: each gets a program of its own, which is quicker than one of
     # any size.
-    compiled: nn.Module = torch.compile(model, dynamic=False)
+    compiled: Predict = torch.compile(model, dynamic=False)
     return compiled
 
 
