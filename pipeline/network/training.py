@@ -353,6 +353,8 @@ def compile_network(model: GaCnn, device: torch.device, ranks: Ranks) -> Predict
             f"train.compiled needs a C++ compiler, and there is no {compiler}",
             "Install g++ or name one in CXX, or set train.compiled = false",
         )
+    # PyTorch compiles a function so many times and no more; those for networks before count.
+    torch.compiler.reset()
     # Batches have two sizes at most: each gets a program of its own, which is quicker than one of
     # any size.
     compiled: Predict = torch.compile(model, dynamic=False)
