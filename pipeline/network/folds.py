@@ -19,6 +19,7 @@ from pipeline.network.samples import Samples, join_samples
 from pipeline.network.training import train
 from pipeline.network.training_figures import EpochMetrics
 
+BEGUN = "objects that can be gripped, labels balanced over q, by the network they began with"
 ARRAYS = ("quality", "single", "averaged")
 Part = tuple[Sequence[str], Samples]  # names that a fold's samples point into, and the samples
 
@@ -38,7 +39,8 @@ class TestedFold:
     averaged
         q̂ averaged over the symmetries, shape (n,).
     facts
-        Numbers of samples, kept epoch and errors of the fold, with those of the baselines.
+        Numbers of samples, kept epoch and errors of the fold, with those of the baselines; and
+        ``begun``, the error on each object of the network that training began with.
     """
 
     __test__ = False  # not a test case, whatever its name
@@ -119,22 +121,25 @@ def train_and_test(
     )
     of_tested = np.isin(np.array(names)[samples.object_index], sorted(tested))
     samples = samples.take(np.flatnonzero(of_tested))
-    single, averaged = (
-        predict(
-            trained.network,
-            samples.cloud,
-            samples.cloud_mask,
-            config.train.batch_size,
-            config.train.threads,
-            average_symmetries=averaging,
-        )
-        for averaging in (False, True)
-    )
     quality, weight = samples.quality, samples.proposal_weight
+
+    def predicted(network: GaCnn, averaging: bool) -> Float[np.ndarray, " n"]:
+        return predict(
+            *(network, samples.cloud, samples.cloud_mask),
+            *(config.train.batch_size, config.train.threads, averaging),
+        )
+
+    def errors(
+        single: Float[np.ndarray, " n"], averaged: Float[np.ndarray, " n"]
+    ) -> list[ObjectError]:
+        return errors_by_object(names, samples.object_index, quality, single, averaged, weight)
+
+    single, averaged = (predicted(trained.network, averaging) for averaging in (False, True))
+    begun = predicted(start, averaging=False) if start else None
     fitted = fit_baselines(train_set, config.gripper, config.train.baseline_samples)
     baselines = baseline_errors(fitted, samples)
     return TestedFold(
-        errors=errors_by_object(names, samples.object_index, quality, single, averaged, weight),
+        errors=errors(single, averaged),
         quality=quality,
         single=single,
         averaged=averaged,
@@ -147,6 +152,7 @@ def train_and_test(
             "mae_single": mean_absolute_error(single, quality),
             "baselines": baselines.balanced,
             "baselines_as_proposed": baselines.as_proposed,
+            "begun": {} if begun is None else {e.name: e.mae for e in errors(begun, begun)},
         },
     )
 
@@ -189,6 +195,10 @@ def figures_of_folds(
             ("grasps as proposed", lambda one: one.mae_as_proposed),
         )
     }
+    begun = {name: mae for found in done for name, mae in found.facts["begun"].items()}
+    if begun:
+        gripped = [one for _, one in errors if one.graspable]
+        macro[BEGUN] = _mean(gripped, lambda one: begun[one.name], resamples, rng)
     return {
         "folds": len(done),
         "objects": len(errors),
@@ -202,7 +212,10 @@ def figures_of_folds(
             for name in done[0].facts["baselines"]
         },
         "macro": macro,
-        "by_object": {one.name: {"fold": fold, **one.figures()} for fold, one in errors},
+        "by_object": {
+            one.name: {"fold": fold, **one.figures(), "mae_begun": begun.get(one.name)}
+            for fold, one in errors
+        },
         "by_fold": {str(fold): found.facts for fold, found in enumerate(done)},
     }
 

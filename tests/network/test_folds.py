@@ -11,6 +11,7 @@ from pipeline.config.learning import NetworkConfig, TrainConfig
 from pipeline.network import folds
 from pipeline.network.folds import Part, figures_of_folds, train_and_test
 from pipeline.network.ga_cnn import build_network
+from pipeline.network.inference import predict
 from pipeline.network.samples import Samples
 from pipeline.network.training import TrainedNetwork, train
 from tests.network.planes import planes_with_holes
@@ -45,14 +46,26 @@ def test_a_fold_begins_with_the_network_that_is_given(tmp_path: Path) -> None:
         update={"train": CONFIG.train.model_copy(update={"learning_rate": 1e-12})}
     )
     start = build_network(CONFIG.network, 5)
-    found = {
-        name: train_and_test(
-            still, parts, 0, {"a0", "b0"}, tmp_path / name, lambda _: None, given
-        ).facts["val_mae"]
+    begun, drawn = (
+        train_and_test(still, parts, 0, {"a0", "b0"}, tmp_path / name, lambda _: None, given)
         for name, given in (("given", start), ("drawn", None))
-    }
-    again = train_and_test(still, parts, 0, {"a0"}, tmp_path / "again", lambda _: None, start)
-    assert again.facts["val_mae"] == found["given"] != found["drawn"]
+    )
+    assert begun.facts["val_mae"] != drawn.facts["val_mae"]
+    names, samples = parts[0]
+    of_a = samples.take(np.flatnonzero(samples.object_index == names.index("a0")))
+    predicted = predict(start, of_a.cloud, of_a.cloud_mask, 16, 1, False)
+    error = float(np.abs(predicted - of_a.quality).mean())
+    assert begun.facts["begun"]["a0"] == pytest.approx(error, abs=1e-6)
+    # Weights that hardly move end near where they began; the norms' statistics follow the samples.
+    assert begun.errors[0].mae == pytest.approx(error, abs=0.02)
+    assert drawn.facts["begun"] == {}
+    families = {"a0": "a", "b0": "b"}
+    figures = figures_of_folds([begun], families, 100, np.random.default_rng(0))
+    gripped = [begun.facts["begun"][one.name] for one in begun.errors if one.graspable]
+    assert figures["macro"][folds.BEGUN]["mae"] == pytest.approx(np.mean(gripped))
+    assert figures["by_object"]["a0"]["mae_begun"] == begun.facts["begun"]["a0"]
+    without = figures_of_folds([drawn], families, 100, np.random.default_rng(0))
+    assert folds.BEGUN not in without["macro"]
 
 
 def test_every_object_is_tested_once_by_a_network_of_other_folds(

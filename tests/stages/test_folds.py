@@ -26,6 +26,7 @@ def fold_found(fold: int) -> TestedFold:
     facts = {"train": 4, "val": 2, "test": 2, "kept_epoch": 1, "val_mae": 0.1, "mae_single": 0.1}
     constant = {"median": 0.25}
     facts_of: dict[str, Any] = facts | {"baselines": constant, "baselines_as_proposed": constant}
+    facts_of |= {"begun": {}}
     return TestedFold([error], q, q, q, facts_of)
 
 
