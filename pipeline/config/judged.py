@@ -5,6 +5,8 @@ from pipeline.config.tree import RunConfig
 
 # Their sections say how many grasps are labelled in all.
 SHARED_OUT = {"per_scene": 0, "portions": 1}
+# They have no random solids, which a run that trains on no mesh needs.
+ANY_MESH = {"meshes_in_training": True}
 
 
 def judged_config(config: RunConfig) -> RunConfig:
@@ -33,7 +35,7 @@ def judged_config(config: RunConfig) -> RunConfig:
     return config.model_copy(
         update={
             "objects": config.objects.model_copy(update=alone),
-            "split": config.split.model_copy(update={"families": families}),
+            "split": config.split.model_copy(update={"families": families} | ANY_MESH),
             "scenes": config.scenes.model_copy(update=scenes),
             "grasps": config.grasps.model_copy(
                 update={"count": config.agreement.labelled, "noise_draws": 1} | SHARED_OUT
@@ -61,7 +63,9 @@ def holdout_config(config: RunConfig) -> RunConfig:
                     "masses": "",
                 }
             ),
-            "split": config.split.model_copy(update={"families": "", "all_in_test": True}),
+            "split": config.split.model_copy(
+                update={"families": "", "all_in_test": True} | ANY_MESH
+            ),
             "scenes": config.scenes.model_copy(
                 update={
                     "levels": wanted.levels,
@@ -99,7 +103,9 @@ def folds_config(config: RunConfig, folds: int) -> RunConfig:
     return config.model_copy(
         update={
             "objects": config.objects.model_copy(update=dealt),
-            "split": config.split.model_copy(update={"families": families, "all_in_test": True}),
+            "split": config.split.model_copy(
+                update={"families": families, "all_in_test": True} | ANY_MESH
+            ),
             "scenes": config.scenes.model_copy(
                 update={
                     "splits": ("test",),

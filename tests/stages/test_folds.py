@@ -1,5 +1,7 @@
 """`make folds` keeps what it has tested: what was stopped goes on at the next fold."""
 
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -8,8 +10,9 @@ import numpy as np
 import pytest
 
 import stages.folds
-from pipeline.config import RunConfig
-from pipeline.config.judged import folds_config, holdout_config
+from pipeline.config import RunConfig, load_run_config
+from pipeline.config.judged import folds_config, holdout_config, judged_config
+from pipeline.config.written import as_toml
 from pipeline.errors import ArtifactError, ConfigError
 from pipeline.execution import RunFolder
 from pipeline.messages.training import CHECKPOINT
@@ -81,6 +84,17 @@ def test_files_beside_the_runs_own_run_toml_are_found_from_within() -> None:
     assert dealt.split.families == "../../paper/families.toml"
     # The meshes of a holdout are others.
     assert holdout_config(config).objects.masses == ""
+
+
+@pytest.mark.parametrize("within", [partial(folds_config, folds=5), holdout_config, judged_config])
+def test_a_run_that_trains_on_no_mesh_has_runs_within_it(
+    within: Callable[[RunConfig], RunConfig], tmp_path: Path
+) -> None:
+    solids = {"objects": {"random_solids": 9}, "split": {"meshes_in_training": False}}
+    path = tmp_path / "run.toml"
+    path.write_text(as_toml(within(RunConfig.model_validate(solids))))
+    # Of their meshes alone.
+    assert load_run_config(path).objects.random_solids == 0
 
 
 def test_folds_begin_with_a_run_that_held_out_the_meshes_and_with_no_other(
