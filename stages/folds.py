@@ -32,7 +32,7 @@ from pipeline.geometry.folds import check_held_out, deal_families
 from pipeline.geometry.parametric import PARAMETRIC_OBJECTS
 from pipeline.messages.objects import TOPIC, object_message, read_objects
 from pipeline.messages.training import CHECKPOINT
-from pipeline.network.checkpoint import save_checkpoint_bytes
+from pipeline.network.checkpoint import checkpoint_digest
 from pipeline.network.fine_tuning import starting_network
 from pipeline.network.folds import TestedFold, figures_of_folds, train_and_test
 from pipeline.network.ga_cnn import GaCnn
@@ -145,7 +145,7 @@ def starting(config: RunConfig, contents: Mapping[str, str], runs_dir: Path) -> 
 
 def key_of(folder: RunFolder, fold: int, folds: int, start: GaCnn | None) -> str:
     """What the test of a fold depends on: all grasps, configuration, code and first weights."""
-    begun = hashlib.sha256(save_checkpoint_bytes(start)).hexdigest() if start else None
+    begun = checkpoint_digest(start) if start else None
     made = [read_provenance(fold_folder(folder, k).artifact("grasps")).key for k in range(folds)]
     text = json.dumps([fold, made, folder.config.read_text(), code_digests(TRAINED_BY), begun])
     return hashlib.sha256(text.encode()).hexdigest()

@@ -23,6 +23,7 @@ from pipeline.messages.training import (
 )
 from pipeline.network.checkpoint import save_checkpoint_bytes
 from pipeline.network.control_inference import ControlPredictor
+from pipeline.network.devices import choose_device
 from pipeline.network.export import check_export, export_onnx_bytes
 from pipeline.network.fine_tuning import measure_fine_tuning, starting_network
 from pipeline.network.fitted_baselines import fit_baselines
@@ -32,7 +33,7 @@ from pipeline.network.parallel import ALONE, Ranks, join_ranks
 from pipeline.network.samples import Samples
 from pipeline.network.sources import baseline_to_json
 from pipeline.network.timing import runtimes_ms_a_grasp
-from pipeline.network.training import TrainedNetwork, choose_device, train
+from pipeline.network.training import TrainedNetwork, train
 from pipeline.network.training_figures import EpochMetrics, TestFigures
 from pipeline.recording.train import draw_train
 from schemas.softgrip.v1.training_pb2 import TrainingResult

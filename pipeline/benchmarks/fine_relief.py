@@ -18,8 +18,7 @@ from jaxtyping import Float
 from pipeline.config import RunConfig, load_run_config
 from pipeline.geometry.mesh import Mesh
 from pipeline.labelling.mesh import label_mesh
-from pipeline.labelling.neighbourhood import sums_within
-from pipeline.labelling.sampling import contact_frames
+from pipeline.labelling.sampling import contact_frames, mean_normals
 from pipeline.messages.objects import read_objects
 
 GRASPS = 400  # an object: a second, and its mean q within 0.02
@@ -68,12 +67,10 @@ def poses_on(mesh: Mesh, radius_m: float, rng: np.random.Generator) -> Float[np.
     solid = trimesh.Trimesh(mesh.vertices_m, mesh.faces, process=False)
     points, faces = trimesh.sample.sample_surface(solid, SURFACE_POINTS, seed=rng)
     contacts = np.array(points[:GRASPS])
-    sums, _ = sums_within(np.array(points), np.array(solid.face_normals[faces]), contacts, radius_m)
-    # Where normals cancel, on a thin edge, there is no approach.
-    lengths = np.linalg.norm(sums, axis=1)
-    kept = lengths > 0.0
-    approach = sums[kept] / lengths[kept, None]
-    return contact_frames(contacts[kept], approach, rng.uniform(0.0, 2 * np.pi, len(approach)))
+    approach = mean_normals(
+        np.array(points), np.array(solid.face_normals[faces]), contacts, radius_m
+    )
+    return contact_frames(contacts, approach, rng.uniform(0.0, 2 * np.pi, len(contacts)))
 
 
 def relief_in_labels(mesh: Mesh, config: RunConfig, rng: np.random.Generator) -> dict[str, float]:

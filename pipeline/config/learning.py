@@ -130,8 +130,8 @@ class TrainConfig(Section):
     )
     compiled: bool = Field(
         False,
-        description="compile the network before the first step: a minute, a C++ compiler and more "
-        "samples a second; of one process",
+        description="PyTorch compiles the network first, for more samples a second; it takes a "
+        "minute and a C++ compiler, and one process trains",
     )
 
 

@@ -170,7 +170,9 @@ def propose(
     """
     contacts = surface.contacts(config.seen_angle_max_rad)
     at = contacts[rng.integers(len(contacts), size=count)]
-    normals = mean_normals(surface, surface.points_m[at], config.normal_radius_m)
+    normals = mean_normals(
+        surface.points_m, surface.normals, surface.points_m[at], config.normal_radius_m
+    )
     tilted = rng.random(count) >= config.normal_share
     tilt = np.where(tilted, rng.uniform(0.0, config.tilt_max_rad, count), 0.0)
     approach = tilt_directions(normals, tilt, rng)
@@ -226,7 +228,7 @@ def propose_nearby(
     contact = np.where((distance <= config.nearby_radius_m)[:, None], contacts[nearest], old)
     step = rng.uniform(0.0, config.nearby_tilt_rad, count)
     approach = tilt_directions(grasps.world_from_contact[:, :3, 2], step, rng)
-    normals = mean_normals(surface, contact, config.normal_radius_m)
+    normals = mean_normals(surface.points_m, surface.normals, contact, config.normal_radius_m)
     cosine = np.clip(np.einsum("ij,ij->i", normals, approach), -1.0, 1.0)
     tilt = np.arccos(cosine)
     # An approach that the first round could not have drawn is replaced by the normal.
@@ -242,16 +244,21 @@ def propose_nearby(
 
 
 def mean_normals(
-    surface: VisibleSurface, points_m: Float[np.ndarray, "k 3"], radius_m: float
+    points_m: Float[np.ndarray, "n 3"],
+    normals: Float[np.ndarray, "n 3"],
+    around_m: Float[np.ndarray, "k 3"],
+    radius_m: float,
 ) -> Float[np.ndarray, "k 3"]:
     """Unit mean of the surface normals around each point (Supplement VI).
 
     Parameters
     ----------
-    surface
-        Points with normals.
     points_m
-        Where the mean is wanted, in WCS [m], shape (k, 3).
+        Points of a surface [m], at least one, shape (n, 3).
+    normals
+        Unit outward normals there, shape (n, 3).
+    around_m
+        Where the mean is wanted, in the same frame [m], shape (k, 3).
     radius_m
         Points within this distance count [m].
 
@@ -260,13 +267,13 @@ def mean_normals(
     Unit vectors, shape (k, 3); the nearest point's normal where no point is within the radius or
     the normals cancel each other.
     """
-    sums, counts = sums_within(surface.points_m, surface.normals, points_m, radius_m)
+    sums, counts = sums_within(points_m, normals, around_m, radius_m)
     lengths = _lengths(sums)
     lonely = lengths <= 1e-6 * np.maximum(counts, 1)
     means = sums / np.where(lonely, 1.0, lengths)[:, None]
     if lonely.any():
-        _, nearest = cKDTree(surface.points_m).query(points_m[lonely])
-        means[lonely] = surface.normals[nearest]
+        _, nearest = cKDTree(points_m).query(around_m[lonely])
+        means[lonely] = normals[nearest]
     return np.asarray(means)
 
 

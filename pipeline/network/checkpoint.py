@@ -35,6 +35,11 @@ def save_checkpoint_bytes(network: GaCnn) -> bytes:
     return tensors_to_bytes(network.state_dict(), metadata)
 
 
+def checkpoint_digest(network: GaCnn) -> str:
+    """SHA-256 of a network's checkpoint, as hexadecimal digits."""
+    return hashlib.sha256(save_checkpoint_bytes(network)).hexdigest()
+
+
 def load_checkpoint_bytes(data: bytes) -> GaCnn:
     """Read the network of a checkpoint.
 

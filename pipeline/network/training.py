@@ -10,11 +10,8 @@ at the same bytes as a run never killed. Several processes (``parallel``) take t
 takes, up to rounding.
 """
 
-import hashlib
 import json
 import math
-import os
-import shutil
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
@@ -27,9 +24,9 @@ from torch import Tensor, nn
 from torch.nn.parallel import DistributedDataParallel
 
 from pipeline.config.learning import NetworkConfig, TrainConfig
-from pipeline.errors import ConfigError, MachineError
 from pipeline.network.canonical import apply_symmetry, network_input
-from pipeline.network.checkpoint import save_checkpoint_bytes
+from pipeline.network.checkpoint import checkpoint_digest
+from pipeline.network.devices import Predict, choose_device, compile_network, mixed_precision
 from pipeline.network.ga_cnn import GaCnn, build_network
 from pipeline.network.input_channels import CHANNELS, SYMMETRIES
 from pipeline.network.loading import (
@@ -57,7 +54,6 @@ STATE_VERSION = 3
 SAVE_EVERY_S = 120.0  # what a kill may cost; a state of 52 layers takes a third of a second
 
 Batch = tuple[Float[Tensor, "b c h w"], Float[Tensor, " b"]]
-Predict = Callable[[Float[Tensor, "b c h w"]], Float[Tensor, " b"]]  # canonical inputs to q-hat
 
 
 @dataclass(frozen=True)
@@ -290,82 +286,6 @@ def build_optimizer(model: GaCnn, config: TrainConfig) -> torch.optim.AdamW:
     return torch.optim.AdamW(groups, lr=config.learning_rate, fused=True)
 
 
-def choose_device(wanted: str, ranks: Ranks) -> torch.device:
-    """The device to train on: the GPU of this process's number, or the CPU.
-
-    Parameters
-    ----------
-    wanted
-        ``auto``, ``cpu`` or ``cuda``; ``auto`` takes a GPU where there is one.
-    ranks
-        This process's place among those that train together.
-
-    Returns
-    -------
-    The device.
-
-    Raises
-    ------
-    MachineError
-        A GPU is asked for by name and there is none.
-    """
-    available = torch.cuda.is_available()
-    if wanted == "cuda" and not available:
-        raise MachineError(
-            "train.device = 'cuda', and PyTorch finds no GPU", "Choose 'auto' or 'cpu'."
-        )
-    return (
-        torch.device("cuda", ranks.local) if available and wanted != "cpu" else torch.device("cpu")
-    )
-
-
-def compile_network(model: GaCnn, device: torch.device, ranks: Ranks) -> Predict:
-    """The same network, its steps joined by PyTorch's compiler; equal to it up to rounding.
-
-    Parameters
-    ----------
-    model
-        The network; the result has its very weights.
-    device
-        Where it lies.
-    ranks
-        Processes that train together.
-
-    Returns
-    -------
-    The network as it is called in training. It is compiled when it is first called.
-
-    Raises
-    ------
-    ConfigError
-        More than one process trains: their shared norms are no part of one network.
-    MachineError
-        There is no C++ compiler.
-    """
-    if ranks.count > 1:
-        raise ConfigError(
-            f"train.compiled is for one process, and {ranks.count} train together",
-            "Set train.compiled = false, or train without RANKS",
-        )
-    compiler = os.environ.get("CXX", "g++")  # what PyTorch looks for
-    if device.type == "cpu" and shutil.which(compiler) is None:
-        raise MachineError(
-            f"train.compiled needs a C++ compiler, and there is no {compiler}",
-            "Install g++ or name one in CXX, or set train.compiled = false",
-        )
-    # PyTorch compiles a function so many times and no more; those for networks before count.
-    torch.compiler.reset()
-    # Batches have two sizes at most: each gets a program of its own, which is quicker than one of
-    # any size.
-    compiled: Predict = torch.compile(model, dynamic=False)
-    return compiled
-
-
-def mixed_precision(device: torch.device) -> torch.autocast:
-    """Use bfloat16 on a GPU; its exponent is single precision's, so the loss needs no scaling."""
-    return torch.autocast(device.type, dtype=torch.bfloat16, enabled=device.type == "cuda")
-
-
 def _mean_absolute_error(
     model: GaCnn, samples: GraspTensors, batch_size: int, device: torch.device, ranks: Ranks
 ) -> float:
@@ -435,6 +355,6 @@ def _identity(
         "val_set": val_set.sha256(),
         "device": device.type,
         "torch": torch.__version__,
-        "start": hashlib.sha256(save_checkpoint_bytes(start)).hexdigest() if start else None,
+        "start": checkpoint_digest(start) if start else None,
     }
     return json.dumps(parts, sort_keys=True)

@@ -110,7 +110,7 @@ def test_mean_normal_of_a_right_angled_edge_is_the_diagonal() -> None:
     points = np.concatenate([np.stack([-u, v, zero], 1), np.stack([zero, v, -u], 1)])
     normals = np.concatenate([np.tile([0.0, 0, 1], (len(u), 1)), np.tile([1.0, 0, 0], (len(u), 1))])
     surface = seen_from_above(points, normals, np.ones(len(points), dtype=int))
-    mean = mean_normals(surface, np.zeros((1, 3)), 0.01)
+    mean = mean_normals(surface.points_m, surface.normals, np.zeros((1, 3)), 0.01)
     np.testing.assert_allclose(mean, [[np.sqrt(0.5), 0, np.sqrt(0.5)]], atol=1e-12)
 
 

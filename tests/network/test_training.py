@@ -12,20 +12,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-import torch
 
 from pipeline.config.learning import NetworkConfig, TrainConfig
-from pipeline.errors import ArtifactError, ConfigError, MachineError
+from pipeline.errors import ArtifactError
 from pipeline.network import training
 from pipeline.network.baselines import mean_predictor_mae
 from pipeline.network.checkpoint import save_checkpoint_bytes
 from pipeline.network.figures import mean_absolute_error
-from pipeline.network.ga_cnn import build_network
 from pipeline.network.inference import predict
-from pipeline.network.parallel import ALONE, Ranks
 from pipeline.network.resuming import STATE_FILE, save_training_state
 from pipeline.network.samples import GraspTensors
-from pipeline.network.training import TrainedNetwork, compile_network, learning_rate_at, train
+from pipeline.network.training import TrainedNetwork, learning_rate_at, train
 from pipeline.network.training_figures import EpochMetrics
 from tests.checked_shapes import VARIABLE as CHECKS
 from tests.network.planes import planes_with_holes
@@ -222,12 +219,3 @@ def test_a_compiled_network_trains_as_the_plain_one(tmp_path: Path) -> None:
     assert compiled["val_mae"] == pytest.approx(plain["val_mae"], rel=1e-2)
     # No wrapper's names are in what is kept.
     assert compiled["weights"] == plain["weights"]
-
-
-def test_what_a_compiled_network_needs_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    network, cpu = build_network(NETWORK, 0), torch.device("cpu")
-    with pytest.raises(ConfigError, match=r"train.compiled is for one process, and 2"):
-        compile_network(network, cpu, Ranks(0, 2, 0))
-    monkeypatch.setenv("CXX", "no-such-compiler")
-    with pytest.raises(MachineError, match="there is no no-such-compiler"):
-        compile_network(network, cpu, ALONE)
