@@ -6,7 +6,8 @@ measured after each epoch on the next; folds.summary.json and .md. Embedded obje
 are dealt too and never tested on. A fold that was tested is kept in ``fold-<k>/tested.json`` until
 its grasps, configuration or code change: what was stopped goes on at the next fold.
 
-With ``folds.start`` every fold begins with the network of a run that held out all meshes.
+With ``folds.start`` every fold begins with the network of a run that held out all meshes;
+with ``folds.trained = false`` too, that network is tested on every fold as it is.
 """
 
 import hashlib
@@ -25,7 +26,7 @@ from pipeline.artifacts import ArtifactWriter, publish_bytes, read_provenance
 from pipeline.config import RunConfig, load_run_config
 from pipeline.config.judged import folds_config
 from pipeline.config.written import as_toml
-from pipeline.errors import ArtifactError
+from pipeline.errors import ArtifactError, ConfigError
 from pipeline.execution import RunFolder, generator, run_command
 from pipeline.execution.code import code_digests
 from pipeline.geometry.folds import check_held_out, deal_families
@@ -115,6 +116,7 @@ def measure(run: RunName = "default", folds: Folds = FOLDS, runs_dir: RunsDir = 
     figures = figures_of_folds(done, families, config.folds.resamples, rng) | {
         "layers": config.network.layers,
         "start": config.folds.start,
+        "trained": config.folds.trained,
         "wall_time_s": time.perf_counter() - began,
     }
     text, summary = as_markdown(figures), json.dumps(figures, indent=1) + "\n"
@@ -131,9 +133,9 @@ def starting(config: RunConfig, contents: Mapping[str, str], runs_dir: Path) -> 
     if not config.folds.start:
         return None
     run = RunFolder(runs_dir / config.folds.start)
-    known = read_objects(run.artifact("objects")).values()
-    split_of = {item.content: split for item, split in known}
-    check_held_out(contents, split_of, config.folds.start)
+    for behind in runs_behind(run):
+        known = read_objects(behind.artifact("objects")).values()
+        check_held_out(contents, {item.content: split for item, split in known}, behind.path.name)
     path = run.path / "train" / CHECKPOINT
     if not path.is_file():
         raise ArtifactError(
@@ -141,6 +143,24 @@ def starting(config: RunConfig, contents: Mapping[str, str], runs_dir: Path) -> 
             f"Train it: make train RUN={config.folds.start}",
         )
     return starting_network(path.read_bytes(), str(path), config.network)
+
+
+def runs_behind(run: RunFolder) -> list[RunFolder]:
+    """A run and, where its training began with another run's network, those that this rests on."""
+    found: list[RunFolder] = []
+    while run.path.resolve() not in [one.path.resolve() for one in found]:
+        found.append(run)
+        named = load_run_config(run.config).train.start if run.config.is_file() else ""
+        if not named:
+            break
+        run = RunFolder((run.path / named).parent.parent)  # of <run>/train/<file>
+        if not run.artifact("objects").is_file():
+            raise ConfigError(
+                f"Run {found[-1].path.name} began with {named}, and what that learned from is "
+                "not known",
+                "Let its train.start name the network of a run whose objects.mcap is there",
+            )
+    return found
 
 
 def key_of(folder: RunFolder, fold: int, folds: int, start: GaCnn | None) -> str:

@@ -130,7 +130,7 @@ def random_solids(
     """Solids drawn from the seed; their shapes are nobody's. Those made before are taken over."""
     config, cache = stage.config.objects, stage.folder.cache / "convex_parts"
     basis = objects_basis(stage.key, stage.config)
-    keys = {n: item_key(basis, solid=n) for n in solid_names(config.random_solids, plan.measured)}
+    keys = {n: item_key(basis, solid=n) for n in solid_names(config, plan.measured)}
     names = [name for name, key in keys.items() if key not in former]
     job = partial(solid_or_why_not, config=config, cache=cache)
     results = apart.run_in_order(job, [(n, generator(stage.config.seed, n)) for n in names])

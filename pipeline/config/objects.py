@@ -54,6 +54,9 @@ class ObjectsConfig(ScaledSection):
     random_solids: int = Field(
         0, ge=0, le=9999, description="further shapes for training: solids drawn from the seed"
     )
+    first_solid: int = Field(
+        1, ge=1, le=999_999, description="number of the first of them; another run has those before"
+    )
     stretched_copies: int = Field(
         0, ge=0, le=100, description="further shapes made of each training object by stretching it"
     )

@@ -19,7 +19,7 @@ from pipeline.world.scene import ClutterScene
 # What says how many items there are, which is no property of any.
 OBJECT_COUNTS = (
     *("objects.limit", "objects.embedded_in_training"),
-    *("objects.stretched_copies", "objects.random_solids"),
+    *("objects.stretched_copies", "objects.random_solids", "objects.first_solid"),
 )
 SCENE_COUNTS = (
     *("scenes.levels", "scenes.clutters_per_level", "scenes.splits", "scenes.impossible"),

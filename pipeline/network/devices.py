@@ -3,6 +3,7 @@
 import os
 import shutil
 from collections.abc import Callable
+from typing import Literal
 
 import torch
 from jaxtyping import Float
@@ -12,6 +13,7 @@ from pipeline.errors import ConfigError, MachineError
 from pipeline.network.ga_cnn import GaCnn
 from pipeline.network.parallel import Ranks
 
+Precision = Literal["auto", "single", "mixed"]
 Predict = Callable[[Float[Tensor, "b c h w"]], Float[Tensor, " b"]]  # canonical inputs to q-hat
 
 
@@ -86,6 +88,19 @@ def compile_network(model: GaCnn, device: torch.device, ranks: Ranks) -> Predict
     return compiled
 
 
-def mixed_precision(device: torch.device) -> torch.autocast:
-    """Use bfloat16 on a GPU; its exponent is single precision's, so the loss needs no scaling."""
-    return torch.autocast(device.type, dtype=torch.bfloat16, enabled=device.type == "cuda")
+def mixed_precision(device: torch.device, wanted: Precision) -> torch.autocast:
+    """Use bfloat16 where it is wanted; its exponent is single precision's: no loss is scaled.
+
+    Parameters
+    ----------
+    device
+        Where the network lies.
+    wanted
+        ``mixed``, ``single``, or ``auto``: on a GPU alone.
+
+    Returns
+    -------
+    The context to compute in.
+    """
+    enabled = wanted == "mixed" or (wanted == "auto" and device.type == "cuda")
+    return torch.autocast(device.type, dtype=torch.bfloat16, enabled=enabled)

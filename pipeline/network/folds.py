@@ -76,10 +76,12 @@ def train_and_test(
 ) -> TestedFold:
     """Train on all folds but this and the next, measure epochs on the next, predict this one.
 
+    With ``folds.trained = false`` the network that is given predicts this one as it is.
+
     Parameters
     ----------
     config
-        Sections network, train and gripper, and the seed.
+        Sections network, train, folds and gripper, and the seed.
     parts
         Every fold, at least three.
     fold
@@ -107,18 +109,25 @@ def train_and_test(
     train_set = join_samples(
         [part for k, (_, part) in enumerate(parts) if k not in (fold, chooses)]
     )
-    val_set = parts[chooses][1]
-    trained = train(
-        config.train,
-        config.network,
-        config.seed,
-        train_set.tensors,
-        val_set.tensors,
-        state_dir,
-        on_epoch,
-        show_progress=True,
-        start=start,
-    )
+    facts: dict[str, Any] = {"train": 0, "val": 0, "kept_epoch": None, "val_mae": None}
+    begun_with, network = None, start
+    if config.folds.trained:
+        val_set = parts[chooses][1]
+        trained = train(
+            config.train,
+            config.network,
+            config.seed,
+            train_set.tensors,
+            val_set.tensors,
+            state_dir,
+            on_epoch,
+            show_progress=True,
+            start=start,
+        )
+        facts = {"train": len(train_set), "val": len(val_set)}
+        facts |= {"kept_epoch": trained.kept_epoch, "val_mae": trained.val_mae}
+        begun_with, network = start, trained.network
+    assert network is not None  # config: what is not trained is given
     of_tested = np.isin(np.array(names)[samples.object_index], sorted(tested))
     samples = samples.take(np.flatnonzero(of_tested))
     quality, weight = samples.quality, samples.proposal_weight
@@ -134,8 +143,8 @@ def train_and_test(
     ) -> list[ObjectError]:
         return errors_by_object(names, samples.object_index, quality, single, averaged, weight)
 
-    single, averaged = (predicted(trained.network, averaging) for averaging in (False, True))
-    begun = predicted(start, averaging=False) if start else None
+    single, averaged = (predicted(network, averaging) for averaging in (False, True))
+    begun = predicted(begun_with, averaging=False) if begun_with else None
     fitted = fit_baselines(train_set, config.gripper, config.train.baseline_samples)
     baselines = baseline_errors(fitted, samples)
     return TestedFold(
@@ -143,12 +152,9 @@ def train_and_test(
         quality=quality,
         single=single,
         averaged=averaged,
-        facts={
-            "train": len(train_set),
-            "val": len(val_set),
+        facts=facts
+        | {
             "test": len(samples),
-            "kept_epoch": trained.kept_epoch,
-            "val_mae": trained.val_mae,
             "mae_single": mean_absolute_error(single, quality),
             "baselines": baselines.balanced,
             "baselines_as_proposed": baselines.as_proposed,

@@ -188,7 +188,7 @@ def train(
                 for group in optimizer.param_groups:
                     group["lr"] = rate
 
-                with mixed_precision(device):
+                with mixed_precision(device, config.precision):
                     predicted = forward(inputs)
                 loss = nn.functional.smooth_l1_loss(
                     predicted, quality, beta=config.loss_beta, reduction="sum"
@@ -297,7 +297,7 @@ def _mean_absolute_error(
     with torch.inference_mode():
         loaded = load_batches(samples, batches, workers=0, pinned=False)
         for inputs, quality in ready_batches(loaded, None, device):
-            with mixed_precision(device):
+            with mixed_precision(device, "auto"):  # as it will be asked
                 predicted = model(inputs)
             error_sum += (predicted - quality).abs().sum()
     return ranks.summed(error_sum).item() / len(samples)

@@ -12,15 +12,17 @@ def as_markdown(figures: Mapping[str, Any]) -> str:
     baselines = ", ".join(
         f"{TITLES[name]} {error:.4f}" for name, error in figures["baselines"].items()
     )
-    begun = (
-        f", trained on from run {figures['start']}, which held out every mesh"
-        if figures["start"]
-        else ""
-    )
+    how = f"a network of {figures['layers']} layers that saw no family of its fold"
+    if figures["start"]:
+        how += f", trained on from run {figures['start']}, which held out every mesh"
+    if not figures["trained"]:
+        how = (
+            f"the network of run {figures['start']}, {figures['layers']} layers, which held out "
+            "every mesh"
+        )
     lines = [
         f"{figures['objects']} objects of {figures['families']} families in {figures['folds']} "
-        f"folds, each tested once by a network of {figures['layers']} layers that saw no family of "
-        f"its fold{begun}; {figures['grasps']} grasps, one prediction each.",
+        f"folds, each tested once by {how}; {figures['grasps']} grasps, one prediction each.",
         "",
         "| mean over objects of \\|q-hat - q\\| | objects | error | 95 % interval |",
         "|-|-|-|-|",
@@ -33,14 +35,15 @@ def as_markdown(figures: Mapping[str, Any]) -> str:
     lines += [
         "",
         f"Over all grasps, not objects: {figures['mae_single']:.4f} with one prediction, "
-        f"{figures['mae']:.4f} with eight averaged; of the baselines, fitted where each network "
-        f"was trained: {baselines}.",
+        f"{figures['mae']:.4f} with eight averaged; of the baselines, fitted to other folds: "
+        f"{baselines}.",
         "",
         "| fold | trained on | measured by epoch on | tested on | val error | test error |",
         "|-|-|-|-|-|-|",
     ]
     lines += [
-        f"| {fold} | {one['train']} | {one['val']} | {one['test']} | {one['val_mae']:.4f} "
+        f"| {fold} | {one['train']} | {one['val']} | {one['test']} "
+        f"| {'none' if one['val_mae'] is None else format(one['val_mae'], '.4f')} "
         f"| {one['mae_single']:.4f} |"
         for fold, one in figures["by_fold"].items()
     ]

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from pipeline.config.objects import ObjectsConfig
 from pipeline.errors import MeshError
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.random_solids import random_solid
@@ -75,6 +76,10 @@ def test_a_warp_brings_no_two_points_nearer_than_its_slope_says(
 
 
 def test_more_solids_leave_the_first_their_names_and_no_mesh_may_have_one() -> None:
-    assert solid_names(5, ())[:3] == solid_names(3, ())
+    three, five, two_more = (
+        ObjectsConfig(random_solids=count, first_solid=first)
+        for count, first in ((3, 1), (5, 1), (2, 4))
+    )
+    assert solid_names(five, ()) == solid_names(three, ()) + solid_names(two_more, ())
     with pytest.raises(MeshError, match="random-solid-0002"):
-        solid_names(2, ["random-solid-0002"])
+        solid_names(three, ["random-solid-0002"])

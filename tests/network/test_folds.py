@@ -5,8 +5,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from pipeline.config import RunConfig
+from pipeline.config.folds import FoldsConfig
 from pipeline.config.learning import NetworkConfig, TrainConfig
 from pipeline.network import folds
 from pipeline.network.folds import Part, figures_of_folds, train_and_test
@@ -14,6 +16,7 @@ from pipeline.network.ga_cnn import build_network
 from pipeline.network.inference import predict
 from pipeline.network.samples import Samples
 from pipeline.network.training import TrainedNetwork, train
+from pipeline.reporting.folds import as_markdown
 from tests.network.planes import planes_with_holes
 
 CONFIG = RunConfig(
@@ -66,6 +69,27 @@ def test_a_fold_begins_with_the_network_that_is_given(tmp_path: Path) -> None:
     assert figures["by_object"]["a0"]["mae_begun"] == begun.facts["begun"]["a0"]
     without = figures_of_folds([drawn], families, 100, np.random.default_rng(0))
     assert folds.BEGUN not in without["macro"]
+
+
+def test_a_network_that_is_not_trained_predicts_every_fold_as_it_is(tmp_path: Path) -> None:
+    as_it_is = FoldsConfig(start="solids", trained=False)
+    config = CONFIG.model_copy(update={"folds": as_it_is})
+    start = build_network(CONFIG.network, 5)
+    names, samples = part(0)
+    parts = [(names, samples), part(1), part(2)]
+    found = train_and_test(config, parts, 0, {"a0"}, tmp_path, lambda _: None, start)
+    of_a = samples.take(np.flatnonzero(samples.object_index == names.index("a0")))
+    predicted = predict(start, of_a.cloud, of_a.cloud_mask, 16, 1, False)
+    np.testing.assert_array_equal(found.single, predicted)
+    assert found.facts["train"] == 0
+    assert found.facts["val_mae"] is None
+    assert not list(tmp_path.iterdir())
+    figures = figures_of_folds([found], {"a0": "a"}, 100, np.random.default_rng(0))
+    assert folds.BEGUN not in figures["macro"]
+    text = as_markdown(figures | {"layers": 18, "start": "solids", "trained": False})
+    assert "each tested once by the network of run solids, 18 layers, which held out" in text
+    with pytest.raises(ValidationError, match="the run that start names"):
+        FoldsConfig(trained=False)
 
 
 def test_every_object_is_tested_once_by_a_network_of_other_folds(

@@ -20,7 +20,7 @@ from pipeline.network.by_object import ObjectError
 from pipeline.network.checkpoint import save_checkpoint_bytes
 from pipeline.network.folds import TestedFold
 from pipeline.network.ga_cnn import build_network
-from stages.folds import TESTED, fold_folder, measure, read_kept, starting
+from stages.folds import TESTED, fold_folder, measure, read_kept, runs_behind, starting
 
 
 def fold_found(fold: int) -> TestedFold:
@@ -117,3 +117,31 @@ def test_folds_begin_with_a_run_that_held_out_the_meshes_and_with_no_other(
     assert started is not None
     assert save_checkpoint_bytes(started) == path.read_bytes()
     assert starting(RunConfig(), own, tmp_path) is None
+
+
+def test_what_a_start_began_with_must_have_held_out_the_meshes_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    config = RunConfig.model_validate({"folds": {"start": "further"}})
+    for name, begun in (("further", "../solids"), ("solids", "../further"), ("lone", "released")):
+        path = tmp_path / name
+        (path / "train").mkdir(parents=True)
+        (path / "train" / CHECKPOINT).write_bytes(
+            save_checkpoint_bytes(build_network(config.folds.network, 3))
+        )
+        start = begun if begun == "released" else f"{begun}/train/{CHECKPOINT}"
+        (path / "run.toml").write_text(f'[train]\nstart = "{start}"\n')
+        (path / "objects.mcap").touch()
+    held_out = {"further": "test", "solids": "train"}
+
+    def known(path: Path) -> dict[str, Any]:
+        return {"mug": (SimpleNamespace(content="a"), held_out[path.parent.name])}
+
+    monkeypatch.setattr(stages.folds, "read_objects", known)
+    with pytest.raises(ConfigError, match=r"Run solids, .* has not held out mug"):
+        starting(config, {"mug": "a"}, tmp_path)
+    held_out["solids"] = "val"
+    wanted = config.model_copy(update={"network": config.folds.network})
+    assert starting(wanted, {"mug": "a"}, tmp_path) is not None
+    with pytest.raises(ConfigError, match="lone began with released, and what that learned"):
+        runs_behind(RunFolder(tmp_path / "lone"))

@@ -16,13 +16,13 @@ from pipeline.geometry.plan import Plan
 from pipeline.geometry.random_solids import random_solid
 
 
-def solid_names(count: int, taken: Collection[str]) -> list[str]:
-    """Names of the first random solids of a run: with more of them, the first stay what they are.
+def solid_names(config: ObjectsConfig, taken: Collection[str]) -> list[str]:
+    """Names of a run's random solids: with more of them, the first stay what they are.
 
     Parameters
     ----------
-    count
-        How many are wanted.
+    config
+        How many are wanted, and the number of the first.
     taken
         Names of meshes, which no solid may have.
 
@@ -35,7 +35,8 @@ def solid_names(count: int, taken: Collection[str]) -> list[str]:
     MeshError
         A mesh has one of them.
     """
-    names = [f"random-solid-{number:04d}" for number in range(1, count + 1)]
+    numbers = range(config.first_solid, config.first_solid + config.random_solids)
+    names = [f"random-solid-{number:04d}" for number in numbers]
     for name in names:
         if name in taken:
             raise MeshError(f"A mesh is named {name}, as a random solid would be", "Rename it")
