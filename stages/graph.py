@@ -96,9 +96,13 @@ def starting_file(folder: RunFolder, named: str) -> Path:
     """The file that ``train.start`` names: the released network's, or one beside run.toml."""
     path = RELEASED_FOLDER / CHECKPOINT_FILE if named == RELEASED else folder.path / named
     if not path.is_file():
+        run = RunFolder(path.parent.parent)  # of <run>/train/<file>
+        remedy = f"Put a {CHECKPOINT_FILE} there"
+        if run.config.is_file():
+            remedy = f"Train that run first: make train RUN={run.path.resolve().name}"
         raise ConfigError(
             f"{path} is missing, and train.start names it",
-            f"Put a {CHECKPOINT_FILE} there, or write train.start = '{RELEASED}'",
+            f"{remedy}, or write train.start = '{RELEASED}'",
         )
     return path
 

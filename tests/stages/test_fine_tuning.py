@@ -47,3 +47,10 @@ def test_the_released_network_is_a_name_and_a_missing_file_is_told(tmp_path: Pat
     folder.config.write_text('[train]\nstart = "none.safetensors"\n')
     with pytest.raises(ConfigError, match=r"none\.safetensors is missing, and train\.start names"):
         inputs_of(TRAIN, folder, None)
+    folder.config.write_text('[train]\nstart = "../solids/train/ga_cnn.safetensors"\n')
+    with pytest.raises(ConfigError, match=r"Put a ga_cnn\.safetensors there, or"):
+        inputs_of(TRAIN, folder, None)
+    (tmp_path / "runs" / "solids").mkdir()
+    (tmp_path / "runs" / "solids" / "run.toml").touch()
+    with pytest.raises(ConfigError, match="Train that run first: make train RUN=solids, or"):
+        inputs_of(TRAIN, folder, None)
