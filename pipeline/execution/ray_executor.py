@@ -123,25 +123,29 @@ def _in_order(
     def send(some: list[Item]) -> Any:
         return remote.remote(*sending.message(named, some))
 
+    def made_of(some: list[Item], sent: Any) -> Iterator[Made]:
+        """What came of a task; the items of one that failed are made one by one."""
+        if len(some) == 1:
+            yield _result(sent, sending, lost, limit_s)
+            return
+        try:
+            made = result_of(sent, sending, limit_s * len(some))
+        except Exception as error:  # noqa: BLE001 - raised again by the item that it is of
+            logger.debug("{} items are made one by one: {}", len(some), error)
+            ray.cancel(sent, force=True)  # where it took too long it still runs
+            for one in some:
+                yield _result(send([one]), sending, lost, limit_s)
+        else:
+            yield made
+
     while True:
         while len(waiting) < ahead and (some := list(islice(following, size.items))):
             waiting.append((some, send(some)))
         if not waiting:
             return
-        some, sent = waiting.popleft()
-        if len(some) > 1:
-            try:
-                made = result_of(sent, sending, limit_s * len(some))
-            except Exception as error:  # noqa: BLE001 - raised again by the item that it is of
-                logger.debug("{} items are made one by one: {}", len(some), error)
-                ray.cancel(sent, force=True)  # where it took too long it still runs
-                for one in some:
-                    yield from _result(send([one]), sending, lost, limit_s).results
-                continue
-        else:
-            made = _result(sent, sending, lost, limit_s)
-        size.learn(made.seconds, len(some))
-        yield from made.results
+        for made in made_of(*waiting.popleft()):
+            size.learn(made.seconds, len(made.results))
+            yield from made.results
 
 
 class TaskSize:
