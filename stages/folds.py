@@ -37,8 +37,9 @@ from pipeline.network.checkpoint import checkpoint_digest
 from pipeline.network.fine_tuning import starting_network
 from pipeline.network.folds import TestedFold, figures_of_folds, train_and_test
 from pipeline.network.ga_cnn import GaCnn
+from pipeline.network.released_files import RELEASED
 from pipeline.reporting.folds import as_markdown
-from stages.graph import RUNS_DIR
+from stages.graph import RUNS_DIR, starting_run
 from stages.holdout import labelled
 from stages.train import print_epoch
 
@@ -146,15 +147,15 @@ def starting(config: RunConfig, contents: Mapping[str, str], runs_dir: Path) -> 
 
 
 def runs_behind(run: RunFolder) -> list[RunFolder]:
-    """A run and, where its training began with another run's network, those that this rests on."""
+    """A run, the run whose network its training began with (``train.start``), and so on back."""
     found: list[RunFolder] = []
     while run.path.resolve() not in [one.path.resolve() for one in found]:
         found.append(run)
         named = load_run_config(run.config).train.start if run.config.is_file() else ""
         if not named:
             break
-        run = RunFolder((run.path / named).parent.parent)  # of <run>/train/<file>
-        if not run.artifact("objects").is_file():
+        run = starting_run(run, named)
+        if named == RELEASED or not run.artifact("objects").is_file():
             raise ConfigError(
                 f"Run {found[-1].path.name} began with {named}, and what that learned from is "
                 "not known",

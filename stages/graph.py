@@ -96,7 +96,7 @@ def starting_file(folder: RunFolder, named: str) -> Path:
     """The file that ``train.start`` names: the released network's, or one beside run.toml."""
     path = RELEASED_FOLDER / CHECKPOINT_FILE if named == RELEASED else folder.path / named
     if not path.is_file():
-        run = RunFolder(path.parent.parent)  # of <run>/train/<file>
+        run = starting_run(folder, named)
         remedy = f"Put a {CHECKPOINT_FILE} there"
         if run.config.is_file():
             remedy = f"Train that run first: make train RUN={run.path.resolve().name}"
@@ -105,6 +105,11 @@ def starting_file(folder: RunFolder, named: str) -> Path:
             f"{remedy}, or write train.start = '{RELEASED}'",
         )
     return path
+
+
+def starting_run(folder: RunFolder, named: str) -> RunFolder:
+    """The run that a file named by ``train.start`` lies in, if it is <run>/train/<file>."""
+    return RunFolder((folder.path / named).parent.parent)
 
 
 def told_of_objects(

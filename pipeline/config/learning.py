@@ -57,6 +57,9 @@ class ShardsConfig(Section):
     compression: Literal["zstd", "lz4", "none"] = "zstd"
 
 
+Precision = Literal["auto", "single", "mixed"]  # what a step of training is computed in
+
+
 class NetworkConfig(Section):
     """GA-CNN: a two-layer stem and four attention stages; Supplement IV."""
 
@@ -128,7 +131,7 @@ class TrainConfig(Section):
     device: Literal["auto", "cpu", "cuda"] = Field(
         "auto", description="'auto' takes a GPU where there is one"
     )
-    precision: Literal["auto", "single", "mixed"] = Field(
+    precision: Precision = Field(
         "auto",
         description="of the steps: 'mixed' takes bfloat16 where its few digits are enough, for "
         "more samples a second on processors that have it; 'auto' takes it on a GPU",

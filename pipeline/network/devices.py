@@ -3,17 +3,16 @@
 import os
 import shutil
 from collections.abc import Callable
-from typing import Literal
 
 import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from pipeline.config.learning import Precision
 from pipeline.errors import ConfigError, MachineError
 from pipeline.network.ga_cnn import GaCnn
 from pipeline.network.parallel import Ranks
 
-Precision = Literal["auto", "single", "mixed"]
 Predict = Callable[[Float[Tensor, "b c h w"]], Float[Tensor, " b"]]  # canonical inputs to q-hat
 
 

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 import torch
 
-from pipeline.config.learning import NetworkConfig, TrainConfig
+from pipeline.config.learning import NetworkConfig, Precision, TrainConfig
 from pipeline.errors import ConfigError, MachineError
-from pipeline.network.devices import Precision, compile_network, mixed_precision
+from pipeline.network.devices import compile_network, mixed_precision
 from pipeline.network.ga_cnn import build_network
 from pipeline.network.parallel import ALONE, Ranks
 from pipeline.network.training import train
