@@ -25,6 +25,7 @@ from loguru import logger
 from pipeline.artifacts import ArtifactWriter, publish_bytes, read_provenance
 from pipeline.config import RunConfig, load_run_config
 from pipeline.config.judged import folds_config
+from pipeline.config.learning import TrainConfig
 from pipeline.config.written import as_toml
 from pipeline.errors import ArtifactError, ConfigError
 from pipeline.execution import RunFolder, generator, run_command
@@ -147,21 +148,25 @@ def starting(config: RunConfig, contents: Mapping[str, str], runs_dir: Path) -> 
 
 
 def runs_behind(run: RunFolder) -> list[RunFolder]:
-    """A run, the run whose network its training began with (``train.start``), and so on back."""
-    found: list[RunFolder] = []
-    while run.path.resolve() not in [one.path.resolve() for one in found]:
-        found.append(run)
-        named = load_run_config(run.config).train.start if run.config.is_file() else ""
-        if not named:
-            break
-        run = starting_run(run, named)
-        if named == RELEASED or not run.artifact("objects").is_file():
-            raise ConfigError(
-                f"Run {found[-1].path.name} began with {named}, and what that learned from is "
-                "not known",
-                "Let its train.start name the network of a run whose objects.mcap is there",
-            )
-    return found
+    """All runs that a run's network learned from, itself first: by train.start, by further_runs."""
+    found: dict[Path, RunFolder] = {}
+    todo = [run]
+    while todo:
+        run = todo.pop()
+        if run.path.resolve() in found:
+            continue
+        found[run.path.resolve()] = run
+        wanted = load_run_config(run.config).train if run.config.is_file() else TrainConfig()
+        further = [(one, RunFolder(run.path / one)) for one in wanted.further_runs]
+        begun = [(wanted.start, starting_run(run, wanted.start))] if wanted.start else []
+        for named, behind in further + begun:
+            if named == RELEASED or not behind.artifact("objects").is_file():
+                raise ConfigError(
+                    f"Run {run.path.name} learned from {named}, and what that knows is not known",
+                    "Let train.start and train.further_runs name runs whose objects.mcap is there",
+                )
+            todo.append(behind)
+    return list(found.values())
 
 
 def key_of(folder: RunFolder, fold: int, folds: int, start: GaCnn | None) -> str:

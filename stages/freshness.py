@@ -131,17 +131,17 @@ def planned(folder: RunFolder, mesh_dir: Path | None, goals: list[str]) -> list[
         raise ConfigError(f"'{unknown[0]}' is no goal that makes artifacts", f"One of {names}")
     wanted = names[: 1 + max(map(names.index, ends))] if ends and not is_sealed(folder) else []
     config = load_run_config(folder.config)
-    meshes = list_mesh_files(mesh_dir) if mesh_dir is not None else []
-    limit = config.objects.limit or len(meshes)
+    meshes = list_mesh_files(mesh_dir)[: config.objects.limit or None] if mesh_dir else []
     embedded = not meshes or config.objects.embedded_in_training
-    sources = min(limit, len(meshes)) + (len(PARAMETRIC_OBJECTS) if embedded else 0)
-    others = list(run_folders(RUNS_DIR))
+    sources = len(meshes) + (len(PARAMETRIC_OBJECTS) if embedded else 0)
+    others, named = list(run_folders(RUNS_DIR)), config.train.further_runs
+    further = [load_run_config(RunFolder(folder.path / one).config) for one in named]
 
     def context_of(name: str) -> StageContext:
         return stage_context(MADE[name], folder, inputs_of, mesh_dir, workers=1)
 
     return [
-        forecast(name, reason, config, sources, others, kept, scans=bool(meshes))
+        forecast(name, reason, config, sources, others, kept, bool(meshes), further)
         for name, reason in reasons(folder, mesh_dir, wanted).items()
         if reason and not reason.startswith(RECORDING_ALONE)
         for kept in [taken_over(name, context_of, work_of(name, config, sources))]

@@ -65,6 +65,7 @@ RUNS_DIR = Path("runs")
 GIVEN_NETWORK = "network.onnx"
 ATTEMPTS = "attempts/"  # before the number of each input that ``train.attempts`` names
 STARTING_NETWORK = "start.safetensors"  # the input that ``train.start`` names
+FURTHER = "further/"  # before the number of each run that ``train.further_runs`` names
 
 
 def inputs_of(stage: Stage, folder: RunFolder, mesh_dir: Path | None) -> dict[str, Path]:
@@ -89,7 +90,27 @@ def inputs_of(stage: Stage, folder: RunFolder, mesh_dir: Path | None) -> dict[st
         inputs |= {f"{ATTEMPTS}{n}": path for n, path in enumerate(artifacts_in(logged))}
     if stage is TRAIN and (named := load_run_config(folder.config).train.start):
         inputs[STARTING_NETWORK] = starting_file(folder, named)
+    if stage is TRAIN and (further := further_runs(folder)):
+        # What they learn from is held against the objects that this run holds out.
+        inputs["objects.mcap"] = folder.artifact(OBJECTS.name)
+        for number, run in enumerate(further):
+            for made in (OBJECTS.name, SHARDS.name):
+                inputs[f"{FURTHER}{number:03d}/{made}.mcap"] = run.artifact(made)
     return inputs
+
+
+def further_runs(folder: RunFolder) -> list[RunFolder]:
+    """The runs that ``train.further_runs`` names, each with its dataset."""
+    named = load_run_config(folder.config).train.further_runs
+    runs = [RunFolder(folder.path / one) for one in named]
+    for run in runs:
+        for made in (OBJECTS.name, SHARDS.name):
+            if not run.artifact(made).is_file():
+                raise ConfigError(
+                    f"{run.artifact(made)} is missing, and train.further_runs names its run",
+                    f"Make it first: make dataset RUN={run.path.resolve().name}",
+                )
+    return runs
 
 
 def starting_file(folder: RunFolder, named: str) -> Path:

@@ -12,6 +12,7 @@ from loguru import logger
 
 from pipeline.artifacts import ArtifactWriter, publish_bytes
 from pipeline.execution import StageContext, Summary, stage_command
+from pipeline.execution.further_runs import check_further_runs
 from pipeline.execution.training_samples import TrainingSet, open_training_set, readers_ahead
 from pipeline.messages.sample_cache import cached_split
 from pipeline.messages.training import (
@@ -37,7 +38,7 @@ from pipeline.network.training import TrainedNetwork, train
 from pipeline.network.training_figures import EpochMetrics, TestFigures
 from pipeline.recording.train import draw_train
 from schemas.softgrip.v1.training_pb2 import TrainingResult
-from stages.graph import ATTEMPTS, STARTING_NETWORK, TRAIN, inputs_of
+from stages.graph import ATTEMPTS, STARTING_NETWORK, TRAIN, further_runs, inputs_of
 
 COMPARED = 512  # test clouds on which the export for control is held against its original
 SAMPLES = "samples"  # folder of the decoded shards, in the run's state
@@ -105,10 +106,14 @@ def build(stage: StageContext, ranks: Ranks = ALONE) -> Summary:
 
 
 def training_set(stage: StageContext) -> TrainingSet:
-    """The train split, opened before anything is decoded, and tried contacts if there are some."""
+    """The train split, opened before anything is decoded; further runs' and tried contacts too."""
     attempts = [path for name, path in sorted(stage.inputs.items()) if name.startswith(ATTEMPTS)]
     cache = stage.folder.state(SAMPLES)
-    return open_training_set(stage.config, stage.upstream("shards"), cache, attempts)
+    if further := further_runs(stage.folder):
+        threshold = stage.config.split.family_threshold
+        check_further_runs(stage.upstream("objects"), further, threshold)
+    indices = [stage.upstream("shards"), *(run.artifact("shards") for run in further)]
+    return open_training_set(stage.config, indices, cache, attempts)
 
 
 def print_epoch(epoch: EpochMetrics) -> None:

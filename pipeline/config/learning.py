@@ -101,6 +101,11 @@ class TrainConfig(Section):
         description="weights to begin with: 'released', or a .safetensors file beside run.toml; "
         "without, they are drawn from the seed",
     )
+    further_runs: tuple[str, ...] = Field(
+        (),
+        description="folders of other runs, beside run.toml: their training samples are learnt "
+        "from too",
+    )
     attempts: tuple[str, ...] = Field(
         (),
         description="files of logged attempts, or folders of them, beside run.toml: what they "

@@ -1,5 +1,6 @@
 """What a training reads: the train split within its limit, what was tried, and who reads ahead."""
 
+import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,10 +10,14 @@ from loguru import logger
 from pipeline.config import RunConfig
 from pipeline.errors import ConfigError
 from pipeline.messages.attempts import read_attempts, tried_contacts
-from pipeline.messages.bounded_samples import open_training
+from pipeline.messages.bounded_samples import MIB, BoundedSamples, open_training
+from pipeline.messages.sample_cache import cached_split
+from pipeline.network.joined_samples import JoinedSamples
 from pipeline.network.loading import SHARED_MEMORY, readers_with_room
 from pipeline.network.outcomes import outcome_samples, with_outcomes
 from pipeline.network.samples import GraspTensors, SampleReader, Samples
+
+FURTHER = "further"  # begins the names of the folders of further runs' decoded samples
 
 
 @dataclass(frozen=True)
@@ -22,12 +27,12 @@ class TrainingSet:
     Attributes
     ----------
     learned
-        What the network learns from, tried contacts included.
+        What the network learns from, further runs' samples and tried contacts included.
     fitted
-        What the baselines are fitted to: the train split, or where that does not fit its first
-        samples, as many as a window; shards are shuffled.
+        What the baselines are fitted to: the run's own train split, or where that does not fit its
+        first samples, as many as a window; shards are shuffled.
     count
-        Samples of the train split.
+        Samples of the train splits.
     """
 
     learned: SampleReader
@@ -36,16 +41,16 @@ class TrainingSet:
 
 
 def open_training_set(
-    config: RunConfig, index: Path, cache: Path, attempts: Sequence[Path]
+    config: RunConfig, indices: Sequence[Path], cache: Path, attempts: Sequence[Path]
 ) -> TrainingSet:
-    """Open the train split and, where ``train.attempts`` names some, what was tried.
+    """Open the train split, those of further runs, and what was tried (``train.attempts``).
 
     Parameters
     ----------
     config
         The run's configuration.
-    index
-        The index of stage shards.
+    indices
+        The index of stage shards, of this run first.
     cache
         Folder of decoded samples.
     attempts
@@ -58,21 +63,48 @@ def open_training_set(
     Raises
     ------
     ConfigError
-        Decoded samples do not fit their limit, or attempts are asked for beside a window.
+        Decoded samples do not fit their limit, or attempts or further runs are asked for beside a
+        window.
+    ArtifactError
+        A shard is missing or damaged, or the runs' clouds have other grids.
     """
     window = config.train.shuffle_window
-    if attempts and window:
+    if window and (attempts or len(indices) > 1):
         raise ConfigError(
-            "tried contacts are trained on only where all samples are drawn among",
-            "Set train.shuffle_window = 0, or leave train.attempts out",
+            "tried contacts and further runs are trained on only where all samples are drawn among",
+            "Set train.shuffle_window = 0, or leave train.attempts and train.further_runs out",
         )
-    samples = open_training(index, cache, config.loading.cache_mib, window)
+    samples = open_training(indices[0], cache, config.loading.cache_mib, window)
     if not isinstance(samples, Samples):
         first = samples.first(window)
         first.tensors  # noqa: B018 - refuses samples that no training can use
         return TrainingSet(samples, first, len(samples))
     learned = with_tried(samples, config, attempts) if attempts else samples.tensors
-    return TrainingSet(learned, samples, len(samples))
+    for left in set(cache.glob(f"{FURTHER}-*")) - set(further_caches(cache, indices)):
+        shutil.rmtree(left)
+    if len(indices) == 1:
+        return TrainingSet(learned, samples, len(samples))
+    further = open_further(indices, cache, config.loading.cache_mib)
+    count = len(samples) + sum(map(len, further))
+    return TrainingSet(JoinedSamples([learned, *further]), samples, count)
+
+
+def open_further(indices: Sequence[Path], cache: Path, limit_mib: int) -> list[GraspTensors]:
+    """Open the train splits of all runs but the first, where all of them together fit the limit."""
+    opened = [BoundedSamples(index, "train", cache, limit_mib * MIB) for index in indices]
+    for number, one in enumerate(opened):
+        one.limit_bytes -= sum(len(before) * before.sample_bytes for before in opened[:number])
+        one.check_room(window=0)
+    caches = further_caches(cache, indices)
+    return [
+        cached_split(index, "train", own).tensors
+        for index, own in zip(indices[1:], caches, strict=True)
+    ]
+
+
+def further_caches(cache: Path, indices: Sequence[Path]) -> list[Path]:
+    """The folder of decoded samples of each run but the first."""
+    return [cache / f"{FURTHER}-{number}" for number in range(1, len(indices))]
 
 
 def with_tried(samples: Samples, config: RunConfig, attempts: Sequence[Path]) -> GraspTensors:

@@ -65,7 +65,9 @@ class Forecast:
     told_by: str = ""
 
 
-def work_of(stage: str, config: RunConfig, sources: int) -> float:
+def work_of(
+    stage: str, config: RunConfig, sources: int, further: Sequence[RunConfig] = ()
+) -> float:
     """How much work a stage will be, by its configuration.
 
     Parameters
@@ -76,6 +78,8 @@ def work_of(stage: str, config: RunConfig, sources: int) -> float:
         The run's configuration.
     sources
         Meshes and embedded objects that stage objects reads.
+    further
+        Configurations of the runs that ``train.further_runs`` names.
 
     Returns
     -------
@@ -95,7 +99,10 @@ def work_of(stage: str, config: RunConfig, sources: int) -> float:
     if stage in ("shards", "train"):
         share = clutters.get("train", 0) / max(sum(clutters.values()), 1)
         samples: float = grasps * (1 + share * (config.grasps.noise_draws - 1))
-        return samples * config.train.epochs if stage == "train" else samples
+        if stage == "shards":
+            return samples
+        learnt = samples + sum(work_of("shards", other, sources) for other in further)
+        return learnt * config.train.epochs
     if stage == "evaluate":
         picked = clutters.get(config.evaluate.split, 0)
         robot = config.evaluate.imperfection
@@ -183,6 +190,7 @@ def forecast(
     others: Sequence[RunFolder],
     kept: float = 0.0,
     scans: bool = False,
+    further: Sequence[RunConfig] = (),
 ) -> Forecast:
     """Scale what the run of most equal work took; of objects, the run that was slowest on each.
 
@@ -204,12 +212,14 @@ def forecast(
         How much of the work is there already and is taken over [units of `work_of`].
     scans
         Whether the run reads a folder of meshes.
+    further
+        Configurations of the runs that ``train.further_runs`` names.
 
     Returns
     -------
     Time, proportional to the work that is left, and disk, to all of it; none where no run tells.
     """
-    units = work_of(stage, config, sources)
+    units = work_of(stage, config, sources, further)
     new = max(units - kept, 0.0)
     reason = in_short(reason)
     if kept > 0:

@@ -30,7 +30,7 @@ from schemas.softgrip.v1.grasps_pb2 import ShardEntry
 DECODED = "decoded"  # folder of the decoded shards, within the cache
 _NAME_LENGTH = 24  # of a digest: enough to tell shards apart
 _LEARNED = ("cloud", "cloud_mask", "quality")
-_MIB = 2**20  # bytes, as the prefix says
+MIB = 2**20  # bytes, as the prefix says
 # A block of an epoch's order that wraps around begins and ends within a shard, at two places.
 _SHARDS_CUT = 3
 
@@ -112,8 +112,8 @@ class BoundedSamples:
         if wanted * self.sample_bytes > self.limit_bytes:
             raise ConfigError(
                 f"{wanted} training samples are drawn from at once and take "
-                f"{-(-wanted * self.sample_bytes // _MIB)} MiB decoded; "
-                f"{max(self.limit_bytes, 0) // _MIB} MiB of loading.cache_mib are left for them",
+                f"{-(-wanted * self.sample_bytes // MIB)} MiB decoded; "
+                f"{max(self.limit_bytes, 0) // MIB} MiB of loading.cache_mib are left for them",
                 "Raise loading.cache_mib, or set train.shuffle_window (now "
                 f"{window or 'all'}) lower; shards.samples_per_shard lower helps too",
             )
@@ -272,7 +272,7 @@ def open_training(
         The limit is too small for the window.
     """
     held_out = sum(entry.samples for entry in read_index(index).shards if entry.split != "train")
-    bounded = BoundedSamples(index, "train", cache, limit_mib * _MIB)
+    bounded = BoundedSamples(index, "train", cache, limit_mib * MIB)
     bounded.limit_bytes -= held_out * bounded.sample_bytes
     bounded.check_room(window)
     if not window:

@@ -61,7 +61,7 @@ def index(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def opened(index: Path, cache: Path, shards: int) -> TrainingSet:
     """With room for so many decoded shards."""
-    found = open_training_set(CONFIG, index, cache, ())
+    found = open_training_set(CONFIG, [index], cache, ())
     assert isinstance(found.learned, BoundedSamples)
     found.learned.limit_bytes = int((shards + 0.5) * SHARD * found.learned.sample_bytes)
     return found
@@ -102,10 +102,24 @@ def test_a_cache_too_small_for_the_window_is_told_before_anything_is_decoded(
         update={"loading": CONFIG.loading.model_copy(update={"cache_mib": 0})}
     )
     with pytest.raises(ConfigError, match=r"of loading\.cache_mib are left"):
-        open_training_set(small, index, tmp_path, ())
+        open_training_set(small, [index], tmp_path, ())
     assert not list(tmp_path.iterdir())
 
 
 def test_attempts_are_not_trained_on_by_windows(index: Path, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"shuffle_window = 0"):
-        open_training_set(CONFIG, index, tmp_path, [tmp_path / "attempts.mcap"])
+        open_training_set(CONFIG, [index], tmp_path, [tmp_path / "attempts.mcap"])
+
+
+def test_all_runs_samples_must_fit_the_cache_together(index: Path, tmp_path: Path) -> None:
+    """A mebibyte holds three times the planes, and not four times."""
+    config = CONFIG.model_copy(
+        update={
+            "train": CONFIG.train.model_copy(update={"shuffle_window": 0}),
+            "loading": CONFIG.loading.model_copy(update={"cache_mib": 1}),
+        }
+    )
+    found = open_training_set(config, [index] * 3, tmp_path, ())
+    assert found.count == len(found.learned) == 3 * len(PLANES)
+    with pytest.raises(ConfigError, match=r"of loading\.cache_mib are left for them"):
+        open_training_set(config, [index] * 4, tmp_path, ())

@@ -46,6 +46,8 @@ def test_work_follows_the_configuration(config: RunConfig) -> None:
     assert work_of("scenes", config, 20) == 2 * (3 + 1 + 2)
     assert work_of("grasps", config, 20) == work_of("shards", config, 20) == 5000
     assert work_of("train", config, 20) == 20_000
+    assert work_of("train", config, 20, further=[config, config]) == 60_000
+    assert work_of("shards", config, 20, further=[config]) == 5000
     curve = 2 * 1 * 2 * 3  # two policies at one clutter a level, at three scales
     assert work_of("evaluate", config, 20) == 2 * 2 * 2 + curve
 

@@ -143,5 +143,18 @@ def test_what_a_start_began_with_must_have_held_out_the_meshes_too(
     held_out["solids"] = "val"
     wanted = config.model_copy(update={"network": config.folds.network})
     assert starting(wanted, {"mug": "a"}, tmp_path) is not None
-    with pytest.raises(ConfigError, match="lone began with released, and what that learned"):
+    with pytest.raises(ConfigError, match="lone learned from released, and what that knows"):
         runs_behind(RunFolder(tmp_path / "lone"))
+
+
+def test_what_a_start_learned_from_beside_must_have_held_out_the_meshes_too(tmp_path: Path) -> None:
+    for name in ("solids", "more"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "objects.mcap").touch()
+    for name, further in (("last", '["../solids", "../more"]'), ("lost", '["../none"]')):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "run.toml").write_text(f"[train]\nfurther_runs = {further}\n")
+    found = {run.path.resolve().name for run in runs_behind(RunFolder(tmp_path / "last"))}
+    assert found == {"last", "solids", "more"}
+    with pytest.raises(ConfigError, match=r"lost learned from \.\./none, and what that knows"):
+        runs_behind(RunFolder(tmp_path / "lost"))
