@@ -3,7 +3,6 @@ stale and why; ``plan GOAL`` says what a make will do, about how long it takes a
 """
 
 import os
-import shutil
 import sys
 from pathlib import Path
 from typing import Annotated
@@ -28,8 +27,8 @@ from pipeline.execution.staleness import (
 )
 from pipeline.geometry.mesh_folders import list_mesh_files
 from pipeline.housekeeping.forecast import Forecast, as_lines, forecast, total_s, work_of
-from pipeline.housekeeping.listing import run_folders
-from stages.graph import EVALUATE, MADE, OBJECTS, RUNS_DIR, SHARDS, STAGES, inputs_of
+from pipeline.housekeeping.listing import free_disk_bytes, run_folders
+from stages.graph import EVALUATE, MADE, OBJECTS, RUNS_DIR, SHARDS, STAGES, TRAIN, inputs_of
 
 # Goals of Make that are not named like the stage that they end with.
 GOALS = {"dataset": SHARDS.name, "eval": EVALUATE.name}
@@ -49,6 +48,9 @@ def key(stage: str, run: RunName = "default", mesh_dir: MeshDir = None) -> None:
     if is_sealed(folder):
         _keep_sealed(folder, stage)
         return
+    goals = os.environ.get("GOALS", "").split()
+    if MADE[stage] is OBJECTS and {"train", "eval", EVALUATE.name} & set(goals):
+        inputs_of(TRAIN, folder, None)  # what run.toml names must be there before hours of work
     context = stage_context(MADE[stage], folder, inputs_of, mesh_dir, workers=1)
     path = folder.state(f"{stage}.key")
     text = context.key.to_json() + context.drawing_key.to_json()
@@ -61,7 +63,7 @@ def key(stage: str, run: RunName = "default", mesh_dir: MeshDir = None) -> None:
     if MADE[stage] is OBJECTS:
         # What train and eval stay with when they are called without MESH_DIR.
         publish_bytes(folder.state("mesh_dir"), str(mesh_dir or "").encode())
-        _tell_plan(folder, mesh_dir, os.environ.get("GOALS", "").split())
+        _tell_plan(folder, mesh_dir, goals)
 
 
 @app.command()
@@ -134,8 +136,9 @@ def planned(folder: RunFolder, mesh_dir: Path | None, goals: list[str]) -> list[
     meshes = list_mesh_files(mesh_dir)[: config.objects.limit or None] if mesh_dir else []
     embedded = not meshes or config.objects.embedded_in_training
     sources = len(meshes) + (len(PARAMETRIC_OBJECTS) if embedded else 0)
-    others, named = list(run_folders(RUNS_DIR)), config.train.further_runs
-    further = [load_run_config(RunFolder(folder.path / one).config) for one in named]
+    others = list(run_folders(RUNS_DIR))
+    named = [RunFolder(folder.path / one).config for one in config.train.further_runs]
+    further = [load_run_config(path) for path in named if path.is_file()]
 
     def context_of(name: str) -> StageContext:
         return stage_context(MADE[name], folder, inputs_of, mesh_dir, workers=1)
@@ -146,11 +149,6 @@ def planned(folder: RunFolder, mesh_dir: Path | None, goals: list[str]) -> list[
         if reason and not reason.startswith(RECORDING_ALONE)
         for kept in [taken_over(name, context_of, work_of(name, config, sources))]
     ]
-
-
-def free_disk_bytes(folder: RunFolder) -> int:
-    """Free bytes where a run lies."""
-    return shutil.disk_usage(folder.path if folder.path.is_dir() else Path()).free
 
 
 def _tell_plan(folder: RunFolder, mesh_dir: Path | None, goals: list[str]) -> None:

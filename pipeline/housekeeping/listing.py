@@ -1,5 +1,6 @@
 """The runs of a folder: size, stages, headline figures, origin."""
 
+import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -94,6 +95,11 @@ def disk_use_bytes(path: Path) -> int:
     if path.is_file():
         return path.stat().st_size
     return sum(_size_bytes(file) for file in path.rglob("*"))
+
+
+def free_disk_bytes(folder: RunFolder) -> int:
+    """Free bytes where a run lies."""
+    return shutil.disk_usage(folder.path if folder.path.is_dir() else Path()).free
 
 
 def _size_bytes(file: Path) -> int:

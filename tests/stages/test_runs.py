@@ -65,6 +65,20 @@ def test_a_plan_names_what_is_made_and_what_it_took_before(
         freshness.plan("lint", run="tiny")
 
 
+@pytest.mark.parametrize(
+    "named", ['start = "../none/train/ga_cnn.safetensors"', 'further_runs = ["../none"]']
+)
+def test_what_a_training_names_must_be_there_before_the_dataset_is_made(
+    folder: RunFolder, monkeypatch: pytest.MonkeyPatch, named: str
+) -> None:
+    folder.config.write_text(folder.config.read_text().replace("[train]", f"[train]\n{named}"))
+    monkeypatch.setenv("GOALS", "dataset")
+    freshness.key("objects", run="tiny")
+    monkeypatch.setenv("GOALS", "train")
+    with pytest.raises(ConfigError, match="is missing, and train"):
+        freshness.key("objects", run="tiny")
+
+
 def test_make_leaves_a_sealed_run_as_it_is_on_another_machine(
     folder: RunFolder, capsys: pytest.CaptureFixture[str]
 ) -> None:
