@@ -8,6 +8,7 @@ from functools import partial
 from loguru import logger
 
 from pipeline.artifacts import publish_bytes
+from pipeline.artifacts.named_inputs import FAMILIES_FILE, MASSES_FILE
 from pipeline.config import section_digest
 from pipeline.errors import MeshError
 from pipeline.execution import (
@@ -33,7 +34,6 @@ from pipeline.geometry.intake import (
     with_all_files,
 )
 from pipeline.geometry.masses import mass_of, read_masses
-from pipeline.geometry.mesh_folders import FAMILIES_FILE, MASSES_FILE
 from pipeline.geometry.plan import Plan, plan_catalogue
 from pipeline.geometry.random_solids.catalogued import (
     solid_names,

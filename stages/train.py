@@ -11,6 +11,7 @@ from functools import partial, update_wrapper
 from loguru import logger
 
 from pipeline.artifacts import ArtifactWriter, publish_bytes
+from pipeline.artifacts.named_inputs import ATTEMPTS, STARTING_NETWORK
 from pipeline.execution import StageContext, Summary, stage_command
 from pipeline.execution.further_runs import check_further_runs
 from pipeline.execution.training_samples import TrainingSet, open_training_set, readers_ahead
@@ -38,7 +39,7 @@ from pipeline.network.training import TrainedNetwork, train
 from pipeline.network.training_figures import EpochMetrics, TestFigures
 from pipeline.recording.train import draw_train
 from schemas.softgrip.v1.training_pb2 import TrainingResult
-from stages.graph import ATTEMPTS, STARTING_NETWORK, TRAIN, further_runs, inputs_of
+from stages.graph import TRAIN, further_runs, inputs_of
 
 COMPARED = 512  # test clouds on which the export for control is held against its original
 SAMPLES = "samples"  # folder of the decoded shards, in the run's state

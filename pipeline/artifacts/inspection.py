@@ -5,14 +5,17 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from pipeline.artifacts.named_inputs import named_inputs
 from pipeline.artifacts.provenance import Input, Provenance
 from pipeline.artifacts.publishing import file_sha256
 from pipeline.artifacts.reading import open_artifact
-from pipeline.errors import ArtifactError
+from pipeline.config import load_run_config
+from pipeline.errors import ArtifactError, ConfigError
 from schemas.softgrip.v1.grasps_pb2 import ShardIndex
 
-MESHES = "meshes/"  # inputs of this name lie in the mesh folder, all others in the run's
+MESHES = "meshes/"  # inputs of this name lie in the mesh folder
 RUN_FILE = "run.toml"
+ARTIFACT_SUFFIX = ".mcap"
 INDEX_NAME = ShardIndex.DESCRIPTOR.full_name
 
 
@@ -107,17 +110,18 @@ def verify_files(path: Path, mesh_dir: Path | None) -> Iterator[Finding]:
     Finding
         One for each file.
     """
-    run = run_folder(path)
-    digest = cache(file_sha256)
+    digest, outside_of = cache(file_sha256), cache(_named_outside)
     waiting, seen = [path.resolve()], set()
     while waiting:
         file = waiting.pop()
         if file in seen:
             continue
         seen.add(file)
+        run = run_folder(file)
         try:
+            outside = outside_of(run, mesh_dir)
             inputs, shards = _read_named_files(file)
-        except ArtifactError as error:
+        except (ArtifactError, ConfigError) as error:
             yield Finding(file, str(error))
             continue
         yield Finding(file)
@@ -132,13 +136,16 @@ def verify_files(path: Path, mesh_dir: Path | None) -> Iterator[Finding]:
             if is_mesh and mesh_dir is None:
                 yield Finding(Path(entry.path), "not compared: name the folder by --mesh-dir")
                 continue
-            named = Input(entry.path.removeprefix(MESHES), entry.sha256) if is_mesh else entry
-            folder = mesh_dir if is_mesh and mesh_dir is not None else run
+            named, folder = entry, run
+            if is_mesh and mesh_dir is not None:
+                named, folder = Input(entry.path.removeprefix(MESHES), entry.sha256), mesh_dir
+            elif place := outside.get(entry.path):
+                named, folder = Input(place.name, entry.sha256), place.parent
             found = _compared(named, folder, file, digest)
-            if found.problem or is_mesh:
+            if found.problem or found.path.suffix != ARTIFACT_SUFFIX:
                 yield found
             else:
-                waiting.append(found.path)
+                waiting.append(found.path.resolve())
 
 
 def run_folder(path: Path) -> Path:
@@ -157,6 +164,12 @@ def _read_named_files(file: Path) -> tuple[tuple[Input, ...], list[Input]]:
         if any(schema == INDEX_NAME for schema, _ in artifact.counts().values()):
             shards = [Input(s.path, s.sha256) for s in artifact.one(ShardIndex).shards]
         return artifact.provenance.inputs, shards
+
+
+def _named_outside(run: Path, mesh_dir: Path | None) -> dict[str, Path]:
+    """Inputs of a run that lie where its run.toml or the mesh folder says: name → file."""
+    config = run / RUN_FILE
+    return named_inputs(run, load_run_config(config), mesh_dir) if config.is_file() else {}
 
 
 def _compared(entry: Input, folder: Path, by: Path, digest: Callable[[Path], str]) -> Finding:

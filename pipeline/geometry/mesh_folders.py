@@ -9,8 +9,6 @@ from pathlib import Path
 from pipeline.errors import MeshError
 
 MESH_SUFFIXES = (".glb", ".gltf", ".obj", ".off", ".ply", ".stl")
-FAMILIES_FILE = "families.toml"  # what a person declares to be alike
-MASSES_FILE = "masses.toml"  # what objects weigh
 SOURCE_SUFFIXES = (*MESH_SUFFIXES, ".urdf")  # a URDF places meshes of the folder at a scale
 
 

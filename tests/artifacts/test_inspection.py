@@ -1,5 +1,6 @@
 """`inspect` says what a file is; `verify` finds what is no longer as it was recorded."""
 
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -135,3 +136,36 @@ def test_from_the_command_line(run: Path) -> None:
     assert absent.returncode == 1
     assert "none.mcap does not exist" in absent.stderr
     assert "Traceback" not in absent.stderr
+
+
+def test_what_run_toml_names_is_followed(run: Path, provenance: Provenance) -> None:
+    """Families and a network elsewhere, masses beside the meshes, another run's files."""
+    other = run.parent / "other"
+    shutil.copytree(run, other)
+    (other / "run.toml").touch()
+    families, weights = run.parent / "families.toml", other / "mine.safetensors"
+    (run / "meshes" / "masses.toml").write_text("cube = 0.1")
+    families.write_text("[families]")
+    weights.write_bytes(b"weights")
+    (run / "run.toml").write_text(
+        '[split]\nfamilies = "../families.toml"\n[train]\nstart = "../other/mine.safetensors"\n'
+        'further_runs = ["../other"]\n'
+    )
+    shutil.copy(other / "grasps.mcap", other / "shards.mcap")
+    outside = {
+        "families.toml": families,
+        "masses.toml": run / "meshes" / "masses.toml",
+        "start.safetensors": weights,
+        "further/000/shards.mcap": other / "shards.mcap",
+    }
+    inputs = tuple(Input(name, file_sha256(path)) for name, path in outside.items())
+    with ArtifactWriter(run / "train.mcap", replace(provenance, inputs=inputs)) as artifact:
+        artifact.write("/objects", CatalogueObject(), log_time_ns=0)
+    assert problems(run, "train.mcap") == {}
+    found = {f.path.resolve() for f in verify_files(run / "train.mcap", run / "meshes")}
+    assert set(outside.values()) <= found
+    assert other / "objects.mcap" in found  # of the other run, up to its meshes
+    weights.write_bytes(b"others")
+    assert list(problems(run, "train.mcap")) == ["mine.safetensors"]
+    (run / "run.toml").write_text("[train]\nsart = 1\n")
+    assert "sart" in problems(run, "train.mcap")["train.mcap"]

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.artifacts import open_artifact
+from pipeline.artifacts.named_inputs import STARTING_NETWORK
 from pipeline.errors import ConfigError
 from pipeline.execution import RunFolder
 from pipeline.execution.staleness import stage_context
@@ -14,7 +15,7 @@ from pipeline.network.released_files import CHECKPOINT_FILE, RELEASED_FOLDER
 from pipeline.recording.train import tuning_table
 from schemas.softgrip.v1.training_pb2 import TrainingResult
 from stages import train
-from stages.graph import STARTING_NETWORK, TRAIN, inputs_of
+from stages.graph import TRAIN, inputs_of
 from tests.stages.conftest import TINY
 
 

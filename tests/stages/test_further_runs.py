@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from pipeline.artifacts import read_provenance
+from pipeline.artifacts.inspection import verify_files
 from pipeline.errors import ConfigError
 from pipeline.execution import RunFolder
 from pipeline.execution.staleness import stage_context
@@ -36,6 +37,9 @@ def test_a_run_learns_from_the_samples_of_another(run: RunFolder, folder: RunFol
     alone = train.training_set(stage_context(TRAIN, run, inputs_of, None, workers=1))
     told = train.build(stage)
     assert told["samples"]["train"] == 2 * alone.count
+    (folder.path.parent / "other" / "run.toml").write_text(TINY)
+    files = {f.path.resolve() for f in verify_files(stage.output, None)}
+    assert folder.path.parent / "other" / "shards.mcap" in files
     cached = folder.state(train.SAMPLES)
     assert [path.name for path in cached.glob("further-*")] == ["further-1"]
     folder.config.write_text(TINY)
