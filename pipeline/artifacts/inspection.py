@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 
 from pipeline.artifacts.named_inputs import named_inputs
+from pipeline.artifacts.names import leads_out
 from pipeline.artifacts.provenance import Input, Provenance
 from pipeline.artifacts.publishing import file_sha256
 from pipeline.artifacts.reading import open_artifact
@@ -174,7 +175,7 @@ def _named_outside(run: Path, mesh_dir: Path | None) -> dict[str, Path]:
 
 def _compared(entry: Input, folder: Path, by: Path, digest: Callable[[Path], str]) -> Finding:
     path = folder / entry.path
-    if not path.resolve().is_relative_to(folder.resolve()):
+    if leads_out(entry.path):
         return Finding(path, f"{by.name} names it, and it leads out of {folder}")
     if not path.is_file():
         return Finding(path, f"missing, though {by.name} was made from it")

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from pipeline.artifacts.names import leads_out
 from pipeline.artifacts.provenance import Provenance
 from pipeline.artifacts.publishing import file_sha256
 from pipeline.artifacts.reading import open_artifact, read_provenance
@@ -95,7 +96,7 @@ def listed_shards(path: Path, splits: Iterable[str] = ("train", "val", "test")) 
 def shard_of(index: Path, entry: ShardEntry) -> Path:
     """The shard of an entry of an index. Raises ArtifactError as `listed_shards` does."""
     shard = index.parent / entry.path
-    if not shard.resolve().is_relative_to(index.parent.resolve()):
+    if leads_out(entry.path):
         raise ArtifactError(
             f"{index} names '{entry.path}', which leads out of its folder",
             "The index is damaged: make it again",

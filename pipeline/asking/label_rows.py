@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.artifacts import open_artifact, read_provenance
+from pipeline.artifacts.names import leads_out
 from pipeline.artifacts.sharding import read_index
 from pipeline.asking.columns import Part, Words, one_word
 from pipeline.asking.poses import pose_columns
@@ -107,7 +108,7 @@ def whole_shards(index: Path) -> Iterator[tuple[Path, str]]:
     key = read_provenance(index).key
     for entry in read_index(index).shards:
         shard = index.parent / entry.path
-        if not shard.resolve().is_relative_to(index.parent.resolve()):
+        if leads_out(entry.path):
             raise ArtifactError(
                 f"{index} names '{entry.path}', which leads out of its folder",
                 "The index is damaged: make it again",

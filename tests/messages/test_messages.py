@@ -148,12 +148,27 @@ def test_a_missing_shard_is_named(tmp_path: Path, provenance: Provenance) -> Non
         listed_shards(index)
 
 
-def test_an_index_cannot_lead_out_of_its_folder(tmp_path: Path, provenance: Provenance) -> None:
+@pytest.mark.parametrize("path", ["../secret.mcap", "grasps/../../secret.mcap", "/secret.mcap"])
+def test_an_index_cannot_lead_out_of_its_folder(
+    tmp_path: Path, provenance: Provenance, path: str
+) -> None:
     index = tmp_path / "run" / "grasps.mcap"
-    outside = [ShardEntry(path="../secret.mcap", samples=1, split="train")]
+    outside = [ShardEntry(path=path, samples=1, split="train")]
     write_index(index, provenance, outside, np.arange(10))
     with pytest.raises(ArtifactError, match="leads out of its folder"):
         listed_shards(index)
+
+
+def test_shards_may_lie_on_another_disk_behind_a_link(
+    tmp_path: Path, provenance: Provenance
+) -> None:
+    index, _ = make_shards(tmp_path / "run", provenance)
+    shards = tmp_path / "run" / "grasps"
+    shards.rename(tmp_path / "large")
+    shards.symlink_to(tmp_path / "large")
+    assert [path.name for path in listed_shards(index)] == [
+        path.name for path in sorted((tmp_path / "large").iterdir())
+    ]
 
 
 def test_only_whole_shards_of_this_key_are_current(tmp_path: Path, provenance: Provenance) -> None:
