@@ -7,6 +7,30 @@ from pydantic import Field, model_validator
 from pipeline.config.section import LengthInMetres, ScaledSection, Section
 
 FEWEST_OBJECTS = 3  # one each for train, val and test
+SolidKind = Literal[
+    "compact",
+    "lump",
+    "revolved",
+    "extruded",
+    "joined",
+    "hollow",
+    "studded",
+    "rod",
+    "dish",
+    "grooved",
+    "row",
+]
+# Drawn where run.toml names no kinds: those that there were first.
+FIRST_KINDS: tuple[SolidKind, ...] = (
+    "compact",
+    "lump",
+    "revolved",
+    "extruded",
+    "joined",
+    "hollow",
+    "studded",
+    "rod",
+)
 
 
 class ConvexPartsConfig(Section):
@@ -56,6 +80,9 @@ class ObjectsConfig(ScaledSection):
     )
     first_solid: int = Field(
         1, ge=1, le=999_999, description="number of the first of them; another run has those before"
+    )
+    solid_kinds: tuple[SolidKind, ...] = Field(
+        FIRST_KINDS, min_length=1, description="what kinds of bodies the solids are drawn from"
     )
     stretched_copies: int = Field(
         0, ge=0, le=100, description="further shapes made of each training object by stretching it"

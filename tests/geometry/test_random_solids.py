@@ -2,17 +2,17 @@
 
 from collections import Counter
 from functools import lru_cache
+from typing import get_args
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.config.objects import ObjectsConfig
+from pipeline.config.objects import FIRST_KINDS, ObjectsConfig, SolidKind
 from pipeline.errors import MeshError
 from pipeline.geometry.mesh import Mesh
-from pipeline.geometry.random_solids import random_solid
-from pipeline.geometry.random_solids.bodies import KINDS
+from pipeline.geometry.random_solids import KINDS, bodies, random_solid
 from pipeline.geometry.random_solids.catalogued import solid_names
 from pipeline.geometry.random_solids.skins import mark, warp
 from pipeline.geometry.shape import nsvr, shape_class, volume
@@ -23,7 +23,7 @@ DRAWN = 40
 
 @lru_cache
 def solid(number: int) -> Mesh:
-    return random_solid(np.random.default_rng([11, number]))
+    return random_solid(np.random.default_rng([11, number]), FIRST_KINDS)
 
 
 @pytest.mark.parametrize("number", range(DRAWN))
@@ -36,7 +36,7 @@ def test_each_is_one_closed_body(number: int) -> None:
 
 
 def test_the_same_stream_draws_the_same_bytes_and_another_one_does_not() -> None:
-    again = random_solid(np.random.default_rng([11, 0]))
+    again = random_solid(np.random.default_rng([11, 0]), FIRST_KINDS)
     assert again.vertices_m.tobytes() == solid(0).vertices_m.tobytes()
     assert again.faces.tobytes() == solid(0).faces.tobytes()
     assert again.vertices_m.tobytes() != solid(1).vertices_m.tobytes()
@@ -56,8 +56,33 @@ def test_each_kind_is_a_solid_and_a_mark_changes_it(kind: str) -> None:
     assert mark(body, rng).volume() not in (0, body.volume())
 
 
-def test_shares_of_the_kinds_are_all() -> None:
-    assert sum(share for _, share in KINDS.values()) == pytest.approx(1)
+def test_shares_of_the_first_kinds_are_all() -> None:
+    assert sum(share for _, share in bodies.KINDS.values()) == pytest.approx(1)
+    assert tuple(bodies.KINDS) == FIRST_KINDS
+    assert tuple(KINDS) == get_args(SolidKind)
+
+
+@pytest.mark.parametrize("kind", ["dish", "grooved", "row"])
+@pytest.mark.parametrize("number", range(5))
+def test_household_kinds_are_one_closed_body(kind: str, number: int) -> None:
+    mesh = random_solid(np.random.default_rng([12, number]), [kind])
+    assert is_closed(mesh)
+    assert len(components(mesh.faces)) == 1
+    assert volume(mesh) > 0
+
+
+@given(st.integers(0, 2**32 - 1))
+@settings(deadline=None, max_examples=20)
+def test_a_dish_is_hollow_and_wider_than_its_wall(seed: int) -> None:
+    """Its hull holds much more than it does: a pad meets the inside of a curve."""
+    body = KINDS["dish"][0](np.random.default_rng(seed))
+    assert body.genus() in (0, 1)  # one where a foot ring shuts in a hollow below
+    assert body.volume() < 0.85 * body.hull().volume()
+
+
+def test_grooves_take_little_and_leave_the_outline() -> None:
+    body = KINDS["grooved"][0](np.random.default_rng(0))
+    assert 0.6 * body.hull().volume() < body.volume() < body.hull().volume()
 
 
 @settings(deadline=None, max_examples=30)

@@ -1,12 +1,14 @@
 """Solids without end, from a seed: training shapes that no folder has and nobody drew."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pipeline.errors import MeshError
 from pipeline.geometry.manifolds import from_manifold
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.parametric.solids import Solid
-from pipeline.geometry.random_solids.bodies import KINDS
+from pipeline.geometry.random_solids import bodies, household
 from pipeline.geometry.random_solids.skins import bent_and_rough, mark
 from pipeline.geometry.shape import mean_thickness
 
@@ -16,15 +18,18 @@ _MARKED_SHARE = 0.45
 _LEAST_THICKNESS = 0.01  # 2 V / A over the longest extent: a cup with a wall of 1 mm
 _MOST_FACES = 40_000  # a scan has 16 000; more is fine ribs that no camera sees
 _MOST_DRAWS = 50
+KINDS = {**bodies.KINDS, **household.KINDS}
 
 
-def random_solid(rng: np.random.Generator) -> Mesh:
+def random_solid(rng: np.random.Generator, kinds: Sequence[str]) -> Mesh:
     """A closed mesh of one body, some 0.1 m long; the same for the same stream.
 
     Parameters
     ----------
     rng
         Draws everything: the kind of body, its marks, its skin.
+    kinds
+        Kinds of bodies to draw from, of `KINDS`.
 
     Returns
     -------
@@ -35,9 +40,9 @@ def random_solid(rng: np.random.Generator) -> Mesh:
     MeshError
         None of 50 draws is a body of some thickness: the stream is no random one.
     """
-    builders, shares = zip(*KINDS.values(), strict=True)
+    builders, shares = zip(*(KINDS[kind] for kind in kinds), strict=True)
     for _ in range(_MOST_DRAWS):
-        body = builders[rng.choice(len(builders), p=shares)](rng)
+        body = builders[rng.choice(len(builders), p=np.divide(shares, sum(shares)))](rng)
         if rng.random() < _MARKED_SHARE:
             body = mark(body, rng)
         mesh = _surface(body, rng)

@@ -64,7 +64,8 @@ def solid_or_why_not(
     name, rng = drawn
 
     def make() -> CatalogueObject:
-        source = MeshSource(name, EMBEDDED, EMBEDDED, random_solid(rng), "m", "declared")
+        mesh = random_solid(rng, config.solid_kinds)
+        source = MeshSource(name, EMBEDDED, EMBEDDED, mesh, "m", "declared")
         return prepare_object(source, config, rng, cache)
 
     return made_or_why_not(name, make)
