@@ -103,10 +103,12 @@ def row(rng: np.random.Generator) -> Solid:
     pitch = 2 * _REACH_M / max(counts) * np.array([1.0, rng.uniform(0.6, 1.4)])
     if counts[1] == 1:
         pitch[1] = _REACH_M * rng.uniform(0.3, 1.6)
-    size = pitch * rng.uniform(0.82, 1.0, 2) if rng.random() < 0.7 else pitch
+    kind = int(rng.integers(3))
+    size = pitch * rng.uniform(0.82, 0.99, 2)
+    if kind != 1 and rng.random() < 0.3:
+        size = 1.01 * pitch  # no gaps; posts would still touch along a line only
     height = _REACH_M * rng.uniform(0.25, 1.2)
     uneven = rng.uniform(0.0, 0.35) if rng.random() < 0.6 else 0.0
-    kind = int(rng.integers(3))
     parts = []
     for i in range(counts[0]):
         for j in range(counts[1]):
@@ -115,9 +117,9 @@ def row(rng: np.random.Generator) -> Solid:
             x, y = (i - (counts[0] - 1) / 2) * pitch[0], (j - (counts[1] - 1) / 2) * pitch[1]
             parts.append(part.translate((float(x), float(y), 0.0)))
     base = height * (1.0 - uneven) * rng.uniform(0.25, 0.9)
-    spread = (np.array(counts) - 1) * pitch + size
-    inset = spread * (rng.uniform(0.6, 1.0) if kind else 1.0)
-    return union([*parts, box(float(inset[0]), float(inset[1]), float(base))])
+    # The base ends within the outermost things, so that all are one.
+    reach = (np.array(counts) - 1) * pitch + size * (rng.uniform(0.2, 0.9) if kind else 1.0)
+    return union([*parts, box(float(reach[0]), max(float(reach[1]), 0.2 * float(size[1])), base)])
 
 
 def _post(kind: int, size_x: float, size_y: float, height: float) -> Solid:
@@ -126,9 +128,10 @@ def _post(kind: int, size_x: float, size_y: float, height: float) -> Solid:
         return box(size_x, size_y, height)
     if kind == 1:
         return cylinder(1.0, height).scale((size_x / 2, size_y / 2, 1.0))
-    lying = cylinder(size_x / 2, size_y, segments=SMALL_ROUND).rotate((90, 0, 0))
-    upright = box(size_x, size_y, max(height - size_x / 2, height / 2))
-    return upright + lying.translate((0, size_y / 2, max(height - size_x / 2, height / 2)))
+    round_top = min(size_x, height) / 2
+    lying = cylinder(1.0, size_y, segments=SMALL_ROUND).rotate((90, 0, 0))
+    lying = lying.scale((size_x / 2, 1.0, round_top)).translate((0, size_y / 2, height - round_top))
+    return box(size_x, size_y, height - round_top) + lying
 
 
 KINDS: dict[str, tuple[Callable[[np.random.Generator], Solid], float]] = {
