@@ -148,24 +148,32 @@ def starting(config: RunConfig, contents: Mapping[str, str], runs_dir: Path) -> 
 
 
 def runs_behind(run: RunFolder) -> list[RunFolder]:
-    """All runs that a run's network learned from, itself first: by train.start, by further_runs."""
+    """All runs whose samples a run's network learned from.
+
+    The run itself and those that its train.further_runs names; then the same of the run whose
+    network its train.start names, and so on back.
+    """
     found: dict[Path, RunFolder] = {}
+    followed: set[Path] = set()
     todo = [run]
     while todo:
         run = todo.pop()
-        if run.path.resolve() in found:
+        if run.path.resolve() in followed:
             continue
+        followed.add(run.path.resolve())
         found[run.path.resolve()] = run
         wanted = load_run_config(run.config).train if run.config.is_file() else TrainConfig()
-        further = [(one, RunFolder(run.path / one)) for one in wanted.further_runs]
         begun = [(wanted.start, starting_run(run, wanted.start))] if wanted.start else []
-        for named, behind in further + begun:
+        further = [(one, RunFolder(run.path / one)) for one in wanted.further_runs]
+        for named, behind in begun + further:
             if named == RELEASED or not behind.artifact("objects").is_file():
                 raise ConfigError(
-                    f"Run {run.path.name} learned from {named}, and what that knows is not known",
+                    f"Run {run.path.name} learned from {named}, and which objects that knows is "
+                    "not recorded",
                     "Let train.start and train.further_runs name runs whose objects.mcap is there",
                 )
-            todo.append(behind)
+        todo += [behind for _, behind in begun]
+        found |= {behind.path.resolve(): behind for _, behind in further}
     return list(found.values())
 
 

@@ -112,11 +112,12 @@ def learned_from(folder: RunFolder) -> dict[str, Path]:
             f"{remedy}, or write train.start = '{RELEASED}'",
         )
     for run in further_runs(folder):
-        for name in FURTHER_FILES:
-            if not (run.path / name).is_file():
+        name = run.path.resolve().name
+        for file in FURTHER_FILES:
+            if not (run.path / file).is_file():
                 raise ConfigError(
-                    f"{run.path / name} is missing, and train.further_runs names its run",
-                    f"Make it first: make dataset RUN={run.path.resolve().name}",
+                    f"{run.path / file} is missing, and train.further_runs names its run",
+                    f"Make it first, with the same MESH_DIR: make dataset RUN={name}",
                 )
         # What they learn from is held against the objects that this run holds out.
         inputs["objects.mcap"] = folder.artifact(OBJECTS.name)
@@ -124,9 +125,19 @@ def learned_from(folder: RunFolder) -> dict[str, Path]:
 
 
 def further_runs(folder: RunFolder) -> list[RunFolder]:
-    """The runs that ``train.further_runs`` names."""
-    named = load_run_config(folder.config).train.further_runs
-    return [RunFolder(folder.path / one) for one in named]
+    """The runs that ``train.further_runs`` names: each once, and not this one."""
+    seen = {folder.path.resolve()}
+    runs = []
+    for named in load_run_config(folder.config).train.further_runs:
+        run = RunFolder(folder.path / named)
+        if run.path.resolve() in seen:
+            raise ConfigError(
+                f"train.further_runs names {named}, which is this run or was named before",
+                "Name each other run once: a run's own samples are learnt from anyhow",
+            )
+        seen.add(run.path.resolve())
+        runs.append(run)
+    return runs
 
 
 def starting_run(folder: RunFolder, named: str) -> RunFolder:

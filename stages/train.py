@@ -111,8 +111,7 @@ def training_set(stage: StageContext) -> TrainingSet:
     attempts = [path for name, path in sorted(stage.inputs.items()) if name.startswith(ATTEMPTS)]
     cache = stage.folder.state(SAMPLES)
     if further := further_runs(stage.folder):
-        threshold = stage.config.split.family_threshold
-        check_further_runs(stage.upstream("objects"), further, threshold)
+        check_further_runs(stage.upstream("objects"), stage.config, further)
     indices = [stage.upstream("shards"), *(run.artifact("shards") for run in further)]
     return open_training_set(stage.config, indices, cache, attempts)
 

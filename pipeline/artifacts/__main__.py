@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from pipeline.artifacts.checksums import verify_folder
-from pipeline.artifacts.inspection import Contents, read_contents, run_folder, verify_files
+from pipeline.artifacts.inspection import Contents, read_contents, verify_files
 from pipeline.errors import SoftgripError
 
 EXIT_FAILURE = 1  # what shells read as a failure
@@ -35,11 +35,7 @@ def verify(
     Of a published folder, every file is compared with the list of digests.
     """
     wrong = whole = 0
-    findings = (
-        verify_folder(file)
-        if file.is_dir()
-        else verify_files(file, mesh_dir or read_mesh_dir_note(file))
-    )
+    findings = verify_folder(file) if file.is_dir() else verify_files(file, mesh_dir)
     for finding in findings:
         if finding.problem:
             wrong += 1
@@ -50,13 +46,6 @@ def verify(
     sys.stdout.write(f"{whole} files as recorded, {wrong} not\n")
     if wrong:
         raise typer.Exit(EXIT_FAILURE)
-
-
-def read_mesh_dir_note(file: Path) -> Path | None:
-    """The mesh folder that Make noted in the run, if any."""
-    note = run_folder(file) / ".state" / "mesh_dir"
-    named = note.read_text().strip() if note.is_file() else ""
-    return Path(named) if named else None
 
 
 def describe(contents: Contents) -> str:

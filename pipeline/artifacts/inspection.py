@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from pipeline.artifacts.named_inputs import named_inputs
-from pipeline.artifacts.names import leads_out
+from pipeline.artifacts.named_inputs import FAMILIES_FILE, MASSES_FILE, named_inputs
 from pipeline.artifacts.provenance import Input, Provenance
 from pipeline.artifacts.publishing import file_sha256
 from pipeline.artifacts.reading import open_artifact
@@ -104,25 +103,29 @@ def verify_files(path: Path, mesh_dir: Path | None) -> Iterator[Finding]:
     path
         The artifact to begin with.
     mesh_dir
-        Folder of the meshes; None: meshes are reported as not compared.
+        Folder of the meshes; None: the folder that Make noted in each run, and where it noted none,
+        meshes are reported as not compared.
 
     Yields
     ------
     Finding
         One for each file.
     """
-    digest, outside_of = cache(file_sha256), cache(_named_outside)
-    waiting, seen = [path.resolve()], set()
+    digest = cache(file_sha256)
+    waiting, seen, places = [path.resolve()], set(), dict[Path, _Places]()
     while waiting:
         file = waiting.pop()
         if file in seen:
             continue
         seen.add(file)
         run = run_folder(file)
+        if run not in places:
+            places[run] = _places_of(run, mesh_dir)
+            if places[run].problem:
+                yield Finding(run / RUN_FILE, places[run].problem)
         try:
-            outside = outside_of(run, mesh_dir)
             inputs, shards = _read_named_files(file)
-        except (ArtifactError, ConfigError) as error:
+        except ArtifactError as error:
             yield Finding(file, str(error))
             continue
         yield Finding(file)
@@ -133,20 +136,54 @@ def verify_files(path: Path, mesh_dir: Path | None) -> Iterator[Finding]:
             else:
                 waiting.append(found.path)
         for entry in inputs:
-            is_mesh = entry.path.startswith(MESHES)
-            if is_mesh and mesh_dir is None:
-                yield Finding(Path(entry.path), "not compared: name the folder by --mesh-dir")
-                continue
-            named, folder = entry, run
-            if is_mesh and mesh_dir is not None:
-                named, folder = Input(entry.path.removeprefix(MESHES), entry.sha256), mesh_dir
-            elif place := outside.get(entry.path):
-                named, folder = Input(place.name, entry.sha256), place.parent
-            found = _compared(named, folder, file, digest)
+            found = _compared_input(entry, run, places[run], file, digest)
             if found.problem or found.path.suffix != ARTIFACT_SUFFIX:
                 yield found
             else:
                 waiting.append(found.path.resolve())
+
+
+@dataclass(frozen=True)
+class _Places:
+    """Where inputs of a run lie that are not in its folder."""
+
+    meshes: Path | None
+    named: dict[str, Path]
+    problem: str = ""
+    """Why what run.toml names is not known, in words."""
+
+
+def _places_of(run: Path, mesh_dir: Path | None) -> _Places:
+    meshes, config = mesh_dir or read_mesh_dir_note(run), run / RUN_FILE
+    if not config.is_file():
+        return _Places(meshes, {})
+    try:
+        return _Places(meshes, named_inputs(run, load_run_config(config), meshes))
+    except (ArtifactError, ConfigError) as error:
+        return _Places(meshes, {}, str(error))
+
+
+def read_mesh_dir_note(run: Path) -> Path | None:
+    """The mesh folder that Make noted in a run, if any."""
+    note = run / ".state" / "mesh_dir"
+    named = note.read_text().strip() if note.is_file() else ""
+    return Path(named) if named else None
+
+
+def _compared_input(
+    entry: Input, run: Path, places: _Places, by: Path, digest: Callable[[Path], str]
+) -> Finding:
+    """One input compared: of the mesh folder, of where run.toml says, else of the run's folder."""
+    if entry.path in places.named:
+        place = places.named[entry.path]
+        return _compared(Input(place.name, entry.sha256), place.parent, by, digest)
+    with_meshes = entry.path.startswith(MESHES) or entry.path in (FAMILIES_FILE, MASSES_FILE)
+    if not with_meshes:
+        return _compared(entry, run, by, digest)
+    if places.meshes is None:
+        return Finding(Path(entry.path), "not compared: name the folder by --mesh-dir")
+    name = entry.path.removeprefix(MESHES)
+    return _compared(Input(name, entry.sha256), places.meshes, by, digest)
 
 
 def run_folder(path: Path) -> Path:
@@ -167,15 +204,9 @@ def _read_named_files(file: Path) -> tuple[tuple[Input, ...], list[Input]]:
         return artifact.provenance.inputs, shards
 
 
-def _named_outside(run: Path, mesh_dir: Path | None) -> dict[str, Path]:
-    """Inputs of a run that lie where its run.toml or the mesh folder says: name → file."""
-    config = run / RUN_FILE
-    return named_inputs(run, load_run_config(config), mesh_dir) if config.is_file() else {}
-
-
 def _compared(entry: Input, folder: Path, by: Path, digest: Callable[[Path], str]) -> Finding:
     path = folder / entry.path
-    if leads_out(entry.path):
+    if not path.resolve().is_relative_to(folder.resolve()):
         return Finding(path, f"{by.name} names it, and it leads out of {folder}")
     if not path.is_file():
         return Finding(path, f"missing, though {by.name} was made from it")

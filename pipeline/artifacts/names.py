@@ -1,7 +1,6 @@
 """Names in messages that become names of files: none leads out of a folder."""
 
 import unicodedata
-from pathlib import PurePosixPath
 
 from pipeline.errors import ContentError
 
@@ -45,21 +44,3 @@ def file_name(name: str) -> str:
     if not fit or not 0 < len(name.encode()) <= LONGEST_BYTES:
         raise ContentError(f"{name[:80]!r} is no name of an object or a scene")
     return name
-
-
-def leads_out(path: str) -> bool:
-    """Whether a path in a message is none below the folder that the message lies in.
-
-    A link that a person made there is none of the message's: shards may lie on a larger disk.
-
-    Parameters
-    ----------
-    path
-        As the message has it.
-
-    Returns
-    -------
-    True for an absolute path and for one with ``..``.
-    """
-    named = PurePosixPath(path)
-    return named.is_absolute() or ".." in named.parts

@@ -1,11 +1,10 @@
 """Artifacts of many files: names of shards, which of them are current, and their index."""
 
 from collections.abc import Iterable
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from pipeline.artifacts.names import leads_out
 from pipeline.artifacts.provenance import Provenance
 from pipeline.artifacts.publishing import file_sha256
 from pipeline.artifacts.reading import open_artifact, read_provenance
@@ -93,14 +92,44 @@ def listed_shards(path: Path, splits: Iterable[str] = ("train", "val", "test")) 
     return [shard_of(path, entry) for entry in read_index(path).shards if entry.split in wanted]
 
 
-def shard_of(index: Path, entry: ShardEntry) -> Path:
-    """The shard of an entry of an index. Raises ArtifactError as `listed_shards` does."""
-    shard = index.parent / entry.path
-    if leads_out(entry.path):
+def place_of(index: Path, entry: ShardEntry) -> Path:
+    """Where the shard of an entry of an index lies, whether it is there or not.
+
+    Parameters
+    ----------
+    index
+        The index.
+    entry
+        What it says of the shard.
+
+    Returns
+    -------
+    The file, within the index's folder.
+
+    Raises
+    ------
+    ArtifactError
+        The name leads out of that folder, or a link on its way does: what is kept of a run, sealed
+        or sent elsewhere, would lack the shard.
+    """
+    named = PurePosixPath(entry.path)
+    if named.is_absolute() or ".." in named.parts:
         raise ArtifactError(
             f"{index} names '{entry.path}', which leads out of its folder",
             "The index is damaged: make it again",
         )
+    shard = index.parent / named
+    if not shard.resolve().is_relative_to(index.parent.resolve()):
+        raise ArtifactError(
+            f"{shard} is reached by a link that leads out of {index.parent}",
+            "Link the whole folder of the run instead, or move the files there",
+        )
+    return shard
+
+
+def shard_of(index: Path, entry: ShardEntry) -> Path:
+    """The shard of an entry of an index. Raises ArtifactError as `listed_shards` does."""
+    shard = place_of(index, entry)
     if not shard.is_file():
         raise ArtifactError(
             f"{shard} is missing, though {index} names it",

@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from pipeline.artifacts import open_artifact, read_provenance
-from pipeline.artifacts.names import leads_out
-from pipeline.artifacts.sharding import read_index
+from pipeline.artifacts.sharding import place_of, read_index
 from pipeline.asking.columns import Part, Words, one_word
 from pipeline.asking.poses import pose_columns
 from pipeline.clutter.levels import level_of
@@ -103,16 +102,11 @@ def whole_shards(index: Path) -> Iterator[tuple[Path, str]]:
     Raises
     ------
     ArtifactError
-        A shard is gone or of another making: the stage is being made anew.
+        A shard is gone or of another making: the stage is being made anew; or it lies elsewhere.
     """
     key = read_provenance(index).key
     for entry in read_index(index).shards:
-        shard = index.parent / entry.path
-        if leads_out(entry.path):
-            raise ArtifactError(
-                f"{index} names '{entry.path}', which leads out of its folder",
-                "The index is damaged: make it again",
-            )
+        shard = place_of(index, entry)
         if not shard.is_file() or read_provenance(shard).key != key:
             raise ArtifactError(
                 f"{shard} is no longer the shard that {index} tells of: stage {index.stem} is "

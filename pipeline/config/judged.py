@@ -7,6 +7,8 @@ from pipeline.config.tree import RunConfig
 SHARED_OUT = {"per_scene": 0, "portions": 1}
 # They have no random solids, which a run that trains on no mesh needs.
 ANY_MESH = {"meshes_in_training": True}
+# What [train] names lies beside the run's own run.toml, and nothing is trained from it here.
+FROM_NOTHING = {"start": "", "further_runs": (), "attempts": ()}
 
 
 def judged_config(config: RunConfig) -> RunConfig:
@@ -40,6 +42,7 @@ def judged_config(config: RunConfig) -> RunConfig:
             "grasps": config.grasps.model_copy(
                 update={"count": config.agreement.labelled, "noise_draws": 1} | SHARED_OUT
             ),
+            "train": config.train.model_copy(update=FROM_NOTHING),
         }
     )
 
@@ -76,6 +79,7 @@ def holdout_config(config: RunConfig) -> RunConfig:
                 }
             ),
             "grasps": config.grasps.model_copy(update={"count": wanted.labelled} | SHARED_OUT),
+            "train": config.train.model_copy(update=FROM_NOTHING),
             "evaluate": config.evaluate.model_copy(
                 update={
                     "split": "test",
@@ -117,6 +121,6 @@ def folds_config(config: RunConfig, folds: int) -> RunConfig:
                 update={"count": -(-wanted.labelled // folds)} | SHARED_OUT
             ),
             "network": wanted.network,
-            "train": config.train.model_copy(update={"epochs": wanted.epochs}),
+            "train": config.train.model_copy(update={"epochs": wanted.epochs} | FROM_NOTHING),
         }
     )

@@ -1,8 +1,8 @@
 """[shards], [network], [train], [loading], [sweep]: files, GA-CNN, its training, its family."""
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, model_validator
 
 from pipeline.config.section import Section
 
@@ -146,6 +146,15 @@ class TrainConfig(Section):
         description="PyTorch compiles the network first, for more samples a second; it takes a "
         "minute and a C++ compiler, and one process trains",
     )
+
+    @model_validator(mode="after")
+    def _windows_stand_alone(self) -> Self:
+        if self.shuffle_window and (self.attempts or self.further_runs):
+            raise ValueError(
+                "attempts and further_runs need every sample at once: set shuffle_window = 0, or "
+                "leave them out"
+            )
+        return self
 
 
 class LoadingConfig(Section):

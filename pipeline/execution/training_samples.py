@@ -7,6 +7,7 @@ from pathlib import Path
 
 from loguru import logger
 
+from pipeline.artifacts.sharding import read_index
 from pipeline.config import RunConfig
 from pipeline.errors import ConfigError
 from pipeline.messages.attempts import read_attempts, tried_contacts
@@ -63,48 +64,58 @@ def open_training_set(
     Raises
     ------
     ConfigError
-        Decoded samples do not fit their limit, or attempts or further runs are asked for beside a
-        window.
+        Decoded samples do not fit their limit.
     ArtifactError
         A shard is missing or damaged, or the runs' clouds have other grids.
     """
-    window = config.train.shuffle_window
-    if window and (attempts or len(indices) > 1):
-        raise ConfigError(
-            "tried contacts and further runs are trained on only where all samples are drawn among",
-            "Set train.shuffle_window = 0, or leave train.attempts and train.further_runs out",
-        )
-    samples = open_training(indices[0], cache, config.loading.cache_mib, window)
+    window, limit_mib = config.train.shuffle_window, config.loading.cache_mib
+    caches = [cache / f"{FURTHER}-{number}" for number in range(1, len(indices))]
+    for left in set(cache.glob(f"{FURTHER}-*")) - set(caches):
+        shutil.rmtree(left, ignore_errors=True)  # another rank may remove it too
+    if caches:
+        check_room_for_all(indices, cache, limit_mib)
+    samples = open_training(indices[0], cache, limit_mib, window)
     if not isinstance(samples, Samples):
         first = samples.first(window)
         first.tensors  # noqa: B018 - refuses samples that no training can use
         return TrainingSet(samples, first, len(samples))
     learned = with_tried(samples, config, attempts) if attempts else samples.tensors
-    for left in set(cache.glob(f"{FURTHER}-*")) - set(further_caches(cache, indices)):
-        shutil.rmtree(left)
-    if len(indices) == 1:
+    if not caches:
         return TrainingSet(learned, samples, len(samples))
-    further = open_further(indices, cache, config.loading.cache_mib)
+    further = [
+        cached_split(index, "train", own).tensors
+        for index, own in zip(indices[1:], caches, strict=True)
+    ]
     count = len(samples) + sum(map(len, further))
     return TrainingSet(JoinedSamples([learned, *further]), samples, count)
 
 
-def open_further(indices: Sequence[Path], cache: Path, limit_mib: int) -> list[GraspTensors]:
-    """Open the train splits of all runs but the first, where all of them together fit the limit."""
+def check_room_for_all(indices: Sequence[Path], cache: Path, limit_mib: int) -> None:
+    """Refuse a limit that all runs' training samples and the held-out ones do not fit into.
+
+    Parameters
+    ----------
+    indices
+        The index of stage shards, of this run first, whose held-out samples are decoded too.
+    cache
+        Folder of decoded samples.
+    limit_mib
+        ``loading.cache_mib``.
+
+    Raises
+    ------
+    ConfigError
+        They do not fit.
+    """
     opened = [BoundedSamples(index, "train", cache, limit_mib * MIB) for index in indices]
-    for number, one in enumerate(opened):
-        one.limit_bytes -= sum(len(before) * before.sample_bytes for before in opened[:number])
-        one.check_room(window=0)
-    caches = further_caches(cache, indices)
-    return [
-        cached_split(index, "train", own).tensors
-        for index, own in zip(indices[1:], caches, strict=True)
-    ]
-
-
-def further_caches(cache: Path, indices: Sequence[Path]) -> list[Path]:
-    """The folder of decoded samples of each run but the first."""
-    return [cache / f"{FURTHER}-{number}" for number in range(1, len(indices))]
+    held_out = sum(one.samples for one in read_index(indices[0]).shards if one.split != "train")
+    needed = sum(len(one) * one.sample_bytes for one in opened) + held_out * opened[0].sample_bytes
+    if needed > limit_mib * MIB:
+        raise ConfigError(
+            f"samples of {len(indices)} runs take {-(-needed // MIB)} MiB decoded, and "
+            f"loading.cache_mib is {limit_mib}",
+            "Raise it, or name fewer runs in train.further_runs",
+        )
 
 
 def with_tried(samples: Samples, config: RunConfig, attempts: Sequence[Path]) -> GraspTensors:

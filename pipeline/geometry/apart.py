@@ -12,11 +12,9 @@ def check_apart(
     other: Mapping[str, tuple[CatalogueObject, str]],
     threshold: float,
     run: str,
+    threshold_there: float,
 ) -> None:
     """Hold that no training object of another run is one of those held out, or like one of them.
-
-    An object that the other run holds out itself is not compared: that run left out what is like
-    it.
 
     Parameters
     ----------
@@ -28,6 +26,9 @@ def check_apart(
         Shapes nearer than this are near-copies [1].
     run
         Name of the other run.
+    threshold_there
+        That run's own threshold: where it is no smaller, what the other run holds out too is not
+        compared by shape again [1].
 
     Raises
     ------
@@ -35,15 +36,18 @@ def check_apart(
         One is: the message names both.
     """
     split_of = {item.content: split for item, split in other.values()}
-    new = [item for item in held_out if split_of.get(item.content) not in ("val", "test")]
-    if not new:
-        return
-    learnt = [(item, describe(item.mesh)) for item, split in other.values() if split == "train"]
-    for item in new:
-        own = describe(item.mesh)
-        for known, descriptor in learnt:
-            same = item.content == known.content or item.family == known.family
-            if same or shape_distance(own, descriptor) < threshold:
+    learnt = [item for item, split in other.values() if split == "train"]
+    described = {}
+    for item in held_out:
+        left_out_there = split_of.get(item.content) in ("val", "test")
+        for known in learnt:
+            near = item.content == known.content or item.family == known.family
+            if not near and not (left_out_there and threshold_there >= threshold):
+                for one in (item, known):
+                    if id(one) not in described:
+                        described[id(one)] = describe(one.mesh)
+                near = shape_distance(described[id(item)], described[id(known)]) < threshold
+            if near:
                 raise ConfigError(
                     f"Run {run}, which train.further_runs names, learns from {known.name}, and "
                     f"this run holds out {item.name}, which is of its family",

@@ -94,6 +94,7 @@ def check_held_out(tested: Mapping[str, str], split_of: Mapping[str, str], run: 
             continue
         why = "was trained on" if content in split_of else "is unknown"
         raise ConfigError(
-            f"Run {run}, which folds.start names, has not held out {name}: it {why} there",
+            f"Run {run}, which the network of folds.start learned from, has not held out {name}: "
+            f"it {why} there",
             f"Make run {run} of the same meshes with split.meshes_in_training = false",
         )

@@ -159,16 +159,16 @@ def test_an_index_cannot_lead_out_of_its_folder(
         listed_shards(index)
 
 
-def test_shards_may_lie_on_another_disk_behind_a_link(
+def test_a_link_out_of_the_folder_is_told_and_one_to_the_whole_folder_is_followed(
     tmp_path: Path, provenance: Provenance
 ) -> None:
-    index, _ = make_shards(tmp_path / "run", provenance)
-    shards = tmp_path / "run" / "grasps"
-    shards.rename(tmp_path / "large")
-    shards.symlink_to(tmp_path / "large")
-    assert [path.name for path in listed_shards(index)] == [
-        path.name for path in sorted((tmp_path / "large").iterdir())
-    ]
+    make_shards(tmp_path / "run", provenance)
+    (tmp_path / "linked").symlink_to(tmp_path / "run")
+    assert len(listed_shards(tmp_path / "linked" / "grasps.mcap")) == 2
+    (tmp_path / "run" / "grasps").rename(tmp_path / "large")
+    (tmp_path / "run" / "grasps").symlink_to(tmp_path / "large")
+    with pytest.raises(ArtifactError, match=r"grasps/.* is reached by a link that leads out of"):
+        listed_shards(tmp_path / "run" / "grasps.mcap")
 
 
 def test_only_whole_shards_of_this_key_are_current(tmp_path: Path, provenance: Provenance) -> None:

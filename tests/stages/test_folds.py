@@ -143,7 +143,7 @@ def test_what_a_start_began_with_must_have_held_out_the_meshes_too(
     held_out["solids"] = "val"
     wanted = config.model_copy(update={"network": config.folds.network})
     assert starting(wanted, {"mug": "a"}, tmp_path) is not None
-    with pytest.raises(ConfigError, match="lone learned from released, and what that knows"):
+    with pytest.raises(ConfigError, match="lone learned from released, and which objects that"):
         runs_behind(RunFolder(tmp_path / "lone"))
 
 
@@ -151,10 +151,24 @@ def test_what_a_start_learned_from_beside_must_have_held_out_the_meshes_too(tmp_
     for name in ("solids", "more"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "objects.mcap").touch()
+    (tmp_path / "more" / "run.toml").write_text('[train]\nstart = "released"\n')  # not its samples
     for name, further in (("last", '["../solids", "../more"]'), ("lost", '["../none"]')):
         (tmp_path / name).mkdir()
         (tmp_path / name / "run.toml").write_text(f"[train]\nfurther_runs = {further}\n")
     found = {run.path.resolve().name for run in runs_behind(RunFolder(tmp_path / "last"))}
     assert found == {"last", "solids", "more"}
-    with pytest.raises(ConfigError, match=r"lost learned from \.\./none, and what that knows"):
+    with pytest.raises(ConfigError, match=r"lost learned from \.\./none, and which objects"):
         runs_behind(RunFolder(tmp_path / "lost"))
+
+
+def test_a_run_that_is_a_start_too_is_followed_back(tmp_path: Path) -> None:
+    starts = {"first": "", "second": "../first/train/w", "last": "../second/train/w"}
+    for name, start in starts.items():
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "objects.mcap").touch()
+        further = '["../second"]' if name == "last" else "[]"
+        (tmp_path / name / "run.toml").write_text(
+            f'[train]\nstart = "{start}"\nfurther_runs = {further}\n'
+        )
+    found = {run.path.resolve().name for run in runs_behind(RunFolder(tmp_path / "last"))}
+    assert found == {"last", "second", "first"}

@@ -40,10 +40,12 @@ def random_solid(rng: np.random.Generator, kinds: Sequence[str]) -> Mesh:
     MeshError
         None of 50 draws is a body of some thickness: the stream is no random one.
     """
-    builders, shares = zip(*(KINDS[kind] for kind in kinds), strict=True)
+    shares = np.array([KINDS[kind][1] for kind in kinds])
     for _ in range(_MOST_DRAWS):
-        body = builders[rng.choice(len(builders), p=np.divide(shares, sum(shares)))](rng)
-        if rng.random() < _MARKED_SHARE:
+        kind = kinds[rng.choice(len(kinds), p=shares / shares.sum())]
+        body = KINDS[kind][0](rng)
+        # Those of a household have their detail: a dish full of dents would be a sieve.
+        if kind in bodies.KINDS and rng.random() < _MARKED_SHARE:
             body = mark(body, rng)
         mesh = _surface(body, rng)
         if mesh is not None:
