@@ -13,7 +13,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from pipeline.artifacts import publish_bytes, read_provenance
+from pipeline.artifacts import open_artifact, publish_bytes, read_provenance
 from pipeline.config import load_run_config
 from pipeline.errors import ArtifactError
 from pipeline.execution import RunFolder, generator, run_command
@@ -35,6 +35,7 @@ from pipeline.network.released_files import (
 from pipeline.network.samples import Samples
 from pipeline.network.sources import baseline_to_json, sha256_of
 from pipeline.spread import choose_evenly
+from schemas.softgrip.v1.training_pb2 import TrainingResult
 from stages.graph import RUNS_DIR
 
 SHOWN_GRASPS = 600  # 2 MiB a file: on which a fine-tuned network shows what it forgot
@@ -62,11 +63,14 @@ def release(
     cloud, mask, quality = test_set.cloud, test_set.cloud_mask, test_set.quality
     single, averaged = (predict(cloud, mask, average_symmetries=each) for each in (False, True))
     weight = test_set.proposal_weight
+    with open_artifact(folder.artifact("train")) as artifact:
+        learnt = artifact.one(TrainingResult).train_count
     errors = errors_by_object(names, test_set.object_index, quality, single, averaged, weight)
     figures = {
         "made_from": read_provenance(folder.artifact("train")).key,
         "seed": config.seed,
         "samples": {split: len(samples) for split, samples in by_split.items()},
+        "learnt_from": learnt,  # with those of further runs
         "mae": mean_absolute_error(averaged, quality),
         "mae_single": mean_absolute_error(single, quality),
         "mae_as_proposed": weighted_error(single, quality, weight),

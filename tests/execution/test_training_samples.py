@@ -114,7 +114,7 @@ def test_all_runs_samples_must_fit_the_cache_together(index: Path, tmp_path: Pat
             "loading": CONFIG.loading.model_copy(update={"cache_mib": 1}),
         }
     )
-    with pytest.raises(ConfigError, match=r"samples of 4 runs take 2 MiB .* cache_mib is 1"):
+    with pytest.raises(ConfigError, match=r"samples of 4 runs take 2 MiB .*cache_mib is 1"):
         open_training_set(config, [index] * 4, tmp_path, ())
     assert not list(tmp_path.iterdir())
     found = open_training_set(config, [index] * 3, tmp_path, ())

@@ -32,6 +32,7 @@ def test_a_runs_network_takes_the_place_of_the_released_one(
     figures = json.loads((tmp_path / "figures.json").read_text())
     trained = json.loads(run.summary("train").read_text())
     assert figures["mae_single"] == pytest.approx(trained["test_mae_single"], abs=1e-4)
+    assert figures["learnt_from"] == trained["samples"]["train"]
     assert figures["mae"] == pytest.approx(trained["test_mae"], abs=1e-4)
     grasps = sum(one["grasps"] for one in figures["by_object"].values())
     assert grasps == len(np.asarray(read_split(run.artifact("shards"), "test").quality))

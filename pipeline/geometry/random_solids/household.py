@@ -1,8 +1,9 @@
 """Bodies of random solids that a kitchen and a toy box hold: dishes, grooved blocks, rows.
 
-Three further kinds beside those of ``bodies``, drawn where ``objects.solid_kinds`` names them. On
-things of these kinds a network that had learned the others erred most: smooth hollows with a rim
-all around, grooves on every face, things that stand side by side at unlike heights.
+Three further kinds beside those of ``bodies``, drawn where ``objects.solid_kinds`` names them:
+smooth hollows with a rim all around, grooves on every face, things that stand side by side at
+unlike heights. They are our choice, after a network that had learned the other kinds erred by 0.079
+on a plate of val (run ``more_solids``), and by 0.027 on a lemon.
 """
 
 import math
