@@ -2,8 +2,9 @@
 
 Three further kinds beside those of ``bodies``, drawn where ``objects.solid_kinds`` names them:
 smooth hollows with a rim all around, grooves on every face, things that stand side by side at
-unlike heights. They are our choice, after a network that had learned the other kinds erred by 0.079
-on a plate of val (run ``more_solids``), and by 0.027 on a lemon.
+unlike heights. Dishes, because a network that had learned the other kinds erred by 0.079 on a plate
+of val (run ``more_solids``); the others, because it erred most on a Rubik's cube and a row of
+blocks of its test: so these two are no blind test of them.
 """
 
 import math
