@@ -49,7 +49,8 @@ def key(stage: str, run: RunName = "default", mesh_dir: MeshDir = None) -> None:
         _keep_sealed(folder, stage)
         return
     goals = os.environ.get("GOALS", "").split()
-    if MADE[stage] is OBJECTS and {"train", "eval", EVALUATE.name} & set(goals):
+    trains = {TRAIN.name, EVALUATE.name} & {GOALS.get(goal, goal) for goal in goals}
+    if MADE[stage] is OBJECTS and trains:
         inputs_of(TRAIN, folder, None)  # what run.toml names must be there before hours of work
     context = stage_context(MADE[stage], folder, inputs_of, mesh_dir, workers=1)
     path = folder.state(f"{stage}.key")

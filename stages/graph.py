@@ -1,10 +1,11 @@
 """The six stages as data, the study beside them, and the files that each of them reads."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from pipeline.artifacts.named_inputs import (
     FAMILIES_FILE,
-    FURTHER_FILES,
+    FURTHER,
     MASSES_FILE,
     RELEASED,
     STARTING_NETWORK,
@@ -111,28 +112,28 @@ def learned_from(folder: RunFolder) -> dict[str, Path]:
             f"{start} is missing, and train.start names it",
             f"{remedy}, or write train.start = '{RELEASED}'",
         )
-    for run in further_runs(folder):
-        name = run.path.resolve().name
-        for file in FURTHER_FILES:
-            if not (run.path / file).is_file():
-                raise ConfigError(
-                    f"{run.path / file} is missing, and train.further_runs names its run",
-                    f"Make it first, with the same MESH_DIR: make dataset RUN={name}",
-                )
+    if further_runs(folder, train.further_runs):
         # What they learn from is held against the objects that this run holds out.
         inputs["objects.mcap"] = folder.artifact(OBJECTS.name)
+    for name, path in inputs.items():
+        if name.startswith(FURTHER) and not path.is_file():
+            raise ConfigError(
+                f"{path} is missing, and train.further_runs names its run",
+                "Make it first, with the same MESH_DIR: "
+                f"make dataset RUN={path.parent.resolve().name}",
+            )
     return inputs
 
 
-def further_runs(folder: RunFolder) -> list[RunFolder]:
-    """The runs that ``train.further_runs`` names: each once, and not this one."""
+def further_runs(folder: RunFolder, named: Sequence[str]) -> list[RunFolder]:
+    """The runs that ``train.further_runs`` of a run names: each once, and not this one."""
     seen = {folder.path.resolve()}
     runs = []
-    for named in load_run_config(folder.config).train.further_runs:
-        run = RunFolder(folder.path / named)
+    for one in named:
+        run = RunFolder(folder.path / one)
         if run.path.resolve() in seen:
             raise ConfigError(
-                f"train.further_runs names {named}, which is this run or was named before",
+                f"train.further_runs names {one}, which is this run or was named before",
                 "Name each other run once: a run's own samples are learnt from anyhow",
             )
         seen.add(run.path.resolve())

@@ -110,7 +110,7 @@ def training_set(stage: StageContext) -> TrainingSet:
     """The train split, opened before anything is decoded; further runs' and tried contacts too."""
     attempts = [path for name, path in sorted(stage.inputs.items()) if name.startswith(ATTEMPTS)]
     cache = stage.folder.state(SAMPLES)
-    if further := further_runs(stage.folder):
+    if further := further_runs(stage.folder, stage.config.train.further_runs):
         check_further_runs(stage.upstream("objects"), stage.config, further)
     indices = [stage.upstream("shards"), *(run.artifact("shards") for run in further)]
     return open_training_set(stage.config, indices, cache, attempts)

@@ -5,7 +5,12 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from pipeline.artifacts.named_inputs import FAMILIES_FILE, MASSES_FILE, named_inputs
+from pipeline.artifacts.named_inputs import (
+    FAMILIES_FILE,
+    MASSES_FILE,
+    named_inputs,
+    noted_mesh_dir,
+)
 from pipeline.artifacts.provenance import Input, Provenance
 from pipeline.artifacts.publishing import file_sha256
 from pipeline.artifacts.reading import open_artifact
@@ -154,20 +159,13 @@ class _Places:
 
 
 def _places_of(run: Path, mesh_dir: Path | None) -> _Places:
-    meshes, config = mesh_dir or read_mesh_dir_note(run), run / RUN_FILE
+    meshes, config = mesh_dir or noted_mesh_dir(run), run / RUN_FILE
     if not config.is_file():
         return _Places(meshes, {})
     try:
         return _Places(meshes, named_inputs(run, load_run_config(config), meshes))
     except (ArtifactError, ConfigError) as error:
         return _Places(meshes, {}, str(error))
-
-
-def read_mesh_dir_note(run: Path) -> Path | None:
-    """The mesh folder that Make noted in a run, if any."""
-    note = run / ".state" / "mesh_dir"
-    named = note.read_text().strip() if note.is_file() else ""
-    return Path(named) if named else None
 
 
 def _compared_input(

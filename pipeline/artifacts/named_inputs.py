@@ -19,6 +19,13 @@ RELEASED = "released"  # what a person writes in a network's place
 RELEASED_CHECKPOINT = Path(__file__).parents[1] / "network" / "released" / "ga_cnn.safetensors"
 
 
+def noted_mesh_dir(run: Path) -> Path | None:
+    """The mesh folder that Make noted in a run; None for the embedded objects."""
+    note = run / ".state" / "mesh_dir"
+    named = note.read_text().strip() if note.is_file() else ""
+    return Path(named) if named else None
+
+
 def object_inputs(run: Path, config: RunConfig, mesh_dir: Path | None) -> dict[str, Path]:
     """Files that tell of the objects: those that run.toml names, else the mesh folder's.
 

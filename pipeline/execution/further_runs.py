@@ -32,6 +32,7 @@ def check_further_runs(objects: Path, config: RunConfig, further: Sequence[RunFo
         One's samples are not of the objects that lie beside them.
     """
     held_out = [item for item, split in read_objects(objects).values() if split != "train"]
+    threshold = config.split.family_threshold
     for run in further:
         name = run.path.resolve().name
         there = load_run_config(run.config) if run.config.is_file() else RunConfig()
@@ -43,8 +44,7 @@ def check_further_runs(objects: Path, config: RunConfig, further: Sequence[RunFo
             )
         check_made_of_its_objects(run)
         known = read_objects(run.artifact("objects"))
-        thresholds = config.split.family_threshold, there.split.family_threshold
-        check_apart(held_out, known, thresholds[0], name, thresholds[1])
+        check_apart(held_out, known, threshold, name, there.split.family_threshold)
 
 
 def check_made_of_its_objects(run: RunFolder) -> None:

@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from pipeline.artifacts.named_inputs import noted_mesh_dir
+
 
 @dataclass(frozen=True)
 class RunFolder:
@@ -41,9 +43,7 @@ class RunFolder:
     @property
     def noted_mesh_dir(self) -> Path | None:
         """The mesh folder that Make noted in the run; None for the embedded objects."""
-        note = self.state("mesh_dir")
-        named = note.read_text().strip() if note.is_file() else ""
-        return Path(named) if named else None
+        return noted_mesh_dir(self.path)
 
     @property
     def cache(self) -> Path:

@@ -35,21 +35,26 @@ def check_apart(
     ConfigError
         One is: the message names both.
     """
-    split_of = {item.content: split for item, split in other.values()}
     learnt = [item for item, split in other.values() if split == "train"]
-    described = {}
-    for item in held_out:
-        left_out_there = split_of.get(item.content) in ("val", "test")
-        for known in learnt:
-            near = item.content == known.content or item.family == known.family
-            if not near and not (left_out_there and threshold_there >= threshold):
-                for one in (item, known):
-                    if id(one) not in described:
-                        described[id(one)] = describe(one.mesh)
-                near = shape_distance(described[id(item)], described[id(known)]) < threshold
-            if near:
-                raise ConfigError(
-                    f"Run {run}, which train.further_runs names, learns from {known.name}, and "
-                    f"this run holds out {item.name}, which is of its family",
-                    f"Hold it out in run {run} too, with the same meshes and split there",
-                )
+    left_out_there = {item.content for item, split in other.values() if split != "train"}
+    trusted = left_out_there if threshold_there >= threshold else set()
+    near = [
+        (item, known)
+        for item in held_out
+        for known in learnt
+        if item.content == known.content or item.family == known.family
+    ]
+    if compared := [item for item in held_out if item.content not in trusted]:
+        described = [(known, describe(known.mesh)) for known in learnt]
+        near += [
+            (item, known)
+            for item, own in ((item, describe(item.mesh)) for item in compared)
+            for known, descriptor in described
+            if shape_distance(own, descriptor) < threshold
+        ]
+    for item, known in near[:1]:
+        raise ConfigError(
+            f"Run {run}, which train.further_runs names, learns from {known.name}, and "
+            f"this run holds out {item.name}, which is of its family",
+            f"Hold it out in run {run} too, with the same meshes and split there",
+        )

@@ -26,14 +26,14 @@ from pipeline.geometry.parametric.solids import (
     union,
 )
 
-_REACH_M = 0.06  # half of a body's longest side, about
+REACH_M = 0.06  # half of a body's longest side, about
 _PROFILE_POINTS = 40  # along a smooth outline; steps of 3 mm
 
 
 def compact_body(rng: np.random.Generator) -> Solid:
     """A superquadric: from box over ellipsoid to double cone, stretched."""
     exponents = rng.uniform(0.15, 1.6, 2)
-    reach = _REACH_M * rng.uniform(0.35, 1.0, 3)
+    reach = REACH_M * rng.uniform(0.35, 1.0, 3)
     unit = np.array(Solid.sphere(1.0, ROUND).to_mesh64().vert_properties)[:, :3]
     level = np.hypot(unit[:, 0], unit[:, 1])
     around = np.arctan2(unit[:, 1], unit[:, 0])
@@ -64,7 +64,7 @@ def lump(rng: np.random.Generator) -> Solid:
     normals = rng.normal(size=(waves, 3)) * rng.uniform(0.8, 2.6, (waves, 1))
     phases = rng.uniform(0, 2 * math.pi, waves)
     swell = rng.uniform(0.1, 0.5) * rng.dirichlet(np.ones(waves))
-    reach = _REACH_M * rng.uniform(0.5, 1.0, 3)
+    reach = REACH_M * rng.uniform(0.5, 1.0, 3)
 
     def shape(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
         radius = 1.0 + np.sin(points @ normals.T + phases) @ swell
@@ -75,8 +75,8 @@ def lump(rng: np.random.Generator) -> Solid:
 
 def revolved_body(rng: np.random.Generator) -> Solid:
     """A smooth or stepped profile turned about z: bottles, cans, knobs, spools."""
-    height = _REACH_M * rng.uniform(0.3, 2.0)
-    reach = _REACH_M * rng.uniform(0.3, 0.9)
+    height = REACH_M * rng.uniform(0.3, 2.0)
+    reach = REACH_M * rng.uniform(0.3, 0.9)
     if rng.random() < 0.5:
         along = np.linspace(0.0, 1.0, _PROFILE_POINTS)
         knots = rng.uniform(0.3, 1.0, rng.integers(2, 6))
@@ -121,14 +121,14 @@ def random_outline(rng: np.random.Generator) -> Section:
         rounded = joined.offset(-corner, manifold3d.JoinType.Round).offset(
             corner, manifold3d.JoinType.Round, circular_segments=SMALL_ROUND
         )
-        return (rounded if not rounded.is_empty() else joined).scale((_REACH_M, _REACH_M))
+        return (rounded if not rounded.is_empty() else joined).scale((REACH_M, REACH_M))
     stretch = rng.uniform(0.4, 1.0, 2)
-    return Section([points * stretch * _REACH_M], manifold3d.FillRule.NonZero)
+    return Section([points * stretch * REACH_M], manifold3d.FillRule.NonZero)
 
 
 def extruded_body(rng: np.random.Generator) -> Solid:
     """An outline drawn up, at times tapered or twisted: blocks, bars, nuts, brackets."""
-    height = _REACH_M * rng.uniform(0.2, 1.8)
+    height = REACH_M * rng.uniform(0.2, 1.8)
     top = tuple(rng.uniform(0.5, 1.0, 2)) if rng.random() < 0.4 else (1.0, 1.0)
     twist = float(rng.uniform(-60, 60)) if rng.random() < 0.25 else 0.0
     return random_outline(rng).extrude(height, 12, twist, top)
@@ -137,7 +137,7 @@ def extruded_body(rng: np.random.Generator) -> Solid:
 def _primitive(rng: np.random.Generator) -> Solid:
     """One simple part, centred."""
     kind = rng.integers(5)
-    a, b, c = _REACH_M * rng.uniform(0.25, 1.0, 3)
+    a, b, c = REACH_M * rng.uniform(0.25, 1.0, 3)
     if kind == 0:
         return box(a * 1.6, b * 1.6, c * 1.6).translate((0, 0, -c * 0.8))
     if kind == 1:
@@ -180,9 +180,9 @@ def joined_body(rng: np.random.Generator) -> Solid:
 def hollow_body(rng: np.random.Generator) -> Solid:
     """A wall around a hollow that is open above: cups, bowls, boxes, tubes."""
     wall = rng.uniform(0.0015, 0.007)
-    height = _REACH_M * rng.uniform(0.3, 1.8)
+    height = REACH_M * rng.uniform(0.3, 1.8)
     top = float(rng.uniform(0.8, 1.7))
-    outline = random_outline(rng) if rng.random() < 0.5 else Section.circle(_REACH_M * 0.7, ROUND)
+    outline = random_outline(rng) if rng.random() < 0.5 else Section.circle(REACH_M * 0.7, ROUND)
     inner = outline.offset(-wall, manifold3d.JoinType.Round)
     outer = outline.extrude(height, 8, 0.0, (top, top))
     if inner.is_empty():
@@ -191,7 +191,7 @@ def hollow_body(rng: np.random.Generator) -> Solid:
     hollow = inner.extrude(height, 8, 0.0, (top, top)).translate((0, 0, floor))
     body = outer - hollow
     if rng.random() < 0.3:
-        reach = _REACH_M * 0.7 * (1 + top) / 2
+        reach = REACH_M * 0.7 * (1 + top) / 2
         handle = sweep(
             _half_ring(height * 0.3) + np.array([reach - 0.004, 0.0, height / 2]),
             rng.uniform(0.003, 0.007),
@@ -208,7 +208,7 @@ def _half_ring(radius: float) -> Float[np.ndarray, "n 3"]:
 
 def studded_plate(rng: np.random.Generator) -> Solid:
     """A plate or block with a field of pegs, ribs, holes or slots: fine structure."""
-    sides = _REACH_M * rng.uniform(0.7, 1.0, 2) * 2
+    sides = REACH_M * rng.uniform(0.7, 1.0, 2) * 2
     thick = rng.uniform(0.003, 0.03)
     plate = box(float(sides[0]), float(sides[1]), float(thick))
     pitch = rng.uniform(0.007, 0.03)
@@ -240,7 +240,7 @@ def rod_body(rng: np.random.Generator) -> Solid:
     steps = rng.normal(size=(count, 3)) * [1.0, 0.35, 0.15]
     steps[:, 0] = np.abs(steps[:, 0]) + 0.4
     knots = np.cumsum(steps, axis=0)
-    knots *= 2 * _REACH_M / np.ptp(knots[:, 0])
+    knots *= 2 * REACH_M / np.ptp(knots[:, 0])
     thick = rng.uniform(0.006, 0.018)
     flat = rng.uniform(0.3, 1.0)
     ball = Solid.sphere(1.0, SMALL_ROUND)

@@ -3,8 +3,8 @@
 Three further kinds beside those of ``bodies``, drawn where ``objects.solid_kinds`` names them:
 smooth hollows with a rim all around, grooves on every face, things that stand side by side at
 unlike heights. Dishes, because a network that had learned the other kinds erred by 0.079 on a plate
-of val (run ``more_solids``); the others, because it erred most on a Rubik's cube and a row of
-blocks of its test: so these two are no blind test of them.
+of val (run ``more_solids``); the others, because a Rubik's cube and a row of blocks of its test
+were among the worst: so these two are no blind test of them.
 """
 
 import math
@@ -25,14 +25,14 @@ from pipeline.geometry.parametric.solids import (
     torus,
     union,
 )
+from pipeline.geometry.random_solids.bodies import REACH_M
 
-_REACH_M = 0.06  # half of a body's longest side, about
 _PROFILE_POINTS = 32  # along a dish's section; steps of 3 mm
 
 
 def dish(rng: np.random.Generator) -> Solid:
     """A shell whose section is an arc, at times with a flat base, flange, bead or foot ring."""
-    wall = _REACH_M * math.exp(rng.uniform(math.log(0.03), math.log(0.13)))
+    wall = REACH_M * math.exp(rng.uniform(math.log(0.03), math.log(0.13)))
     middle = _dish_section(rng)
     step = np.gradient(middle, axis=0)
     normal = np.column_stack([-step[:, 1], step[:, 0]])
@@ -58,17 +58,17 @@ def dish(rng: np.random.Generator) -> Solid:
 
 def _dish_section(rng: np.random.Generator) -> Float[np.ndarray, "n 2"]:
     """The middle of a dish's wall from its axis to its rim: radius and height."""
-    base = _REACH_M * rng.uniform(0.0, 0.75)
-    depth = _REACH_M * math.exp(rng.uniform(math.log(0.12), math.log(1.4)))
+    base = REACH_M * rng.uniform(0.0, 0.75)
+    depth = REACH_M * math.exp(rng.uniform(math.log(0.12), math.log(1.4)))
     turn = np.linspace(0.0, rng.uniform(0.9, math.pi / 2), _PROFILE_POINTS)
     bend = rng.uniform(0.7, 1.4, 2)
     out, up = np.sin(turn) ** bend[0], 1.0 - np.cos(turn) ** bend[1]
-    radius = base + (_REACH_M - base) * out / out[-1]
+    radius = base + (REACH_M - base) * out / out[-1]
     arc = np.column_stack([radius, depth * up / up[-1]])
     section = [np.linspace([0.0, 0.0], arc[0], 8)[:-1]] if base > 0 else []
     section.append(arc)
     if rng.random() < 0.4:
-        reach = _REACH_M * rng.uniform(0.1, 0.45)
+        reach = REACH_M * rng.uniform(0.1, 0.45)
         flange = arc[-1] + reach * np.array([1.0, rng.uniform(0.0, 0.4)])
         section.append(np.linspace(arc[-1], flange, 6)[1:])
     return np.vstack(section)
@@ -76,7 +76,7 @@ def _dish_section(rng: np.random.Generator) -> Float[np.ndarray, "n 2"]:
 
 def grooved_block(rng: np.random.Generator) -> Solid:
     """A block whose faces are cut into fields by grooves: cubes of cubes, bricks, chocolate."""
-    sides = 2 * _REACH_M * (rng.uniform(0.35, 1.0, 3) if rng.random() < 0.6 else np.ones(3))
+    sides = 2 * REACH_M * (rng.uniform(0.35, 1.0, 3) if rng.random() < 0.6 else np.ones(3))
     smallest = float(sides.min())
     # Few and shallow enough that convex parts are found in seconds: no lattice.
     counts = np.clip(np.round(sides / (smallest / rng.integers(2, 5))), 1, 5).astype(int)
@@ -103,14 +103,14 @@ def grooved_block(rng: np.random.Generator) -> Solid:
 def row(rng: np.random.Generator) -> Solid:
     """Blocks, rods or posts side by side on a base, alike or at heights of their own."""
     counts = (int(rng.integers(2, 8)), 1 if rng.random() < 0.5 else int(rng.integers(2, 5)))
-    pitch = 2 * _REACH_M / max(counts) * np.array([1.0, rng.uniform(0.6, 1.4)])
+    pitch = 2 * REACH_M / max(counts) * np.array([1.0, rng.uniform(0.6, 1.4)])
     if counts[1] == 1:
-        pitch[1] = _REACH_M * rng.uniform(0.3, 1.6)
+        pitch[1] = REACH_M * rng.uniform(0.3, 1.6)
     kind = int(rng.integers(3))
     size = pitch * rng.uniform(0.82, 0.99, 2)
     if kind != 1 and rng.random() < 0.3:
         size = 1.01 * pitch  # no gaps; posts would still touch along a line only
-    height = _REACH_M * rng.uniform(0.25, 1.2)
+    height = REACH_M * rng.uniform(0.25, 1.2)
     uneven = rng.uniform(0.0, 0.35) if rng.random() < 0.6 else 0.0
     parts = []
     for i in range(counts[0]):
