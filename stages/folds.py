@@ -144,7 +144,8 @@ def starting(config: RunConfig, contents: Mapping[str, str], runs_dir: Path) -> 
             f"{path} is missing, and folds.start names its run",
             f"Train it: make train RUN={config.folds.start}",
         )
-    return starting_network(path.read_bytes(), str(path), config.network)
+    seed = config.seed if config.folds.trained else None  # nothing would train further layers
+    return starting_network(path.read_bytes(), str(path), config.network, seed)
 
 
 def runs_behind(run: RunFolder) -> list[RunFolder]:

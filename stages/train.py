@@ -54,7 +54,8 @@ def build(stage: StageContext, ranks: Ranks = ALONE) -> Summary:
         for name in ("val", "test")
     )
     begun = stage.inputs.get(STARTING_NETWORK)
-    start = starting_network(begun.read_bytes(), str(begun), config.network) if begun else None
+    wanted = (config.network, config.seed)
+    start = starting_network(begun.read_bytes(), str(begun), *wanted) if begun else None
     # On a CPU readers would take the cores that train.
     on_gpu = choose_device(config.train.device, ranks).type == "cuda"
     readers = max(stage.workers // ranks.count, 1) if on_gpu else 0

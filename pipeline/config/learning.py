@@ -99,7 +99,8 @@ class TrainConfig(Section):
     start: str = Field(
         "",
         description="weights to begin with: 'released', or a .safetensors file beside run.toml; "
-        "without, they are drawn from the seed",
+        "with more layers than its network has, those are added to it; without, weights are drawn "
+        "from the seed",
     )
     further_runs: tuple[str, ...] = Field(
         (),

@@ -15,6 +15,7 @@ from pipeline.network.checkpoint import (
     tensors_from_bytes,
     tensors_to_bytes,
 )
+from pipeline.network.deepening import can_be_deepened, deepened
 from pipeline.network.figures import mean_absolute_error
 from pipeline.network.ga_cnn import GaCnn
 from pipeline.network.inference import predict
@@ -30,8 +31,10 @@ from pipeline.network.training_figures import FineTuning
 _FORMAT = "softgrip.grasps"
 
 
-def starting_network(data: bytes, named: str, wanted: NetworkConfig) -> GaCnn:
-    """The network that a training begins with.
+def starting_network(
+    data: bytes, named: str, wanted: NetworkConfig, seed: int | None = None
+) -> GaCnn:
+    """The network that a training begins with; made deeper where the run wants more layers.
 
     Parameters
     ----------
@@ -41,6 +44,8 @@ def starting_network(data: bytes, named: str, wanted: NetworkConfig) -> GaCnn:
         What messages call it.
     wanted
         The run's [network].
+    seed
+        Seed of the weights of blocks that it does not have; None: it must have all.
 
     Returns
     -------
@@ -51,7 +56,7 @@ def starting_network(data: bytes, named: str, wanted: NetworkConfig) -> GaCnn:
     ArtifactError
         The bytes are no network, or its input is an older program's.
     ConfigError
-        It is no network as the run wants one.
+        It is no network as the run wants one, nor one to be made deeper.
     """
     try:
         network = load_checkpoint_bytes(data)
@@ -62,11 +67,15 @@ def starting_network(data: bytes, named: str, wanted: NetworkConfig) -> GaCnn:
             f"{named} takes the input channels {', '.join(network.channels)} of an older program",
             "Begin with a network of this program, or without train.start",
         )
-    if network.config != wanted:
-        own = network.config
+    own = network.config
+    if seed is not None and can_be_deepened(own, wanted):
+        return deepened(network, wanted, seed)
+    if own != wanted:
+        layers = f"{own.layers}" if seed is None else f"{own.layers} or more"
         raise ConfigError(
-            f"{named}, named by train.start, has other layers or channels than the run's [network]",
-            f"Set network.layers = {own.layers}, network.channels = {list(own.channels)} and "
+            f"{named} has {own.layers} layers of channels {list(own.channels)}, and the run wants "
+            f"{wanted.layers} of {list(wanted.channels)} of it",
+            f"Set network.layers = {layers}, network.channels = {list(own.channels)} and "
             f"network.attention = '{own.attention}'",
         )
     return network

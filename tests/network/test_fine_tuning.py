@@ -91,8 +91,14 @@ def test_a_network_of_another_kind_is_refused_by_name(start: GaCnn) -> None:
     data = save_checkpoint_bytes(start)
     assert save_checkpoint_bytes(starting_network(data, "own", NETWORK)) == data
     deeper = NETWORK.model_copy(update={"layers": 20})
-    with pytest.raises(ConfigError, match=r"own.*Set network\.layers = 18.*\[8, 8, 16, 32\]"):
+    with pytest.raises(ConfigError, match=r"own has 18.*20.*Set network\.layers = 18, "):
         starting_network(data, "own", deeper)
+    deep = save_checkpoint_bytes(build_network(deeper, 0))
+    with pytest.raises(ConfigError, match=r"deep has 20 .*18.*Set network\.layers = 20 or more, "):
+        starting_network(deep, "deep", NETWORK, seed=0)
+    wider = deeper.model_copy(update={"channels": (8, 16, 16, 32)})
+    with pytest.raises(ConfigError, match=r"own has .*\[8, 8, 16, 32\].*\[8, 16, 16, 32\]"):
+        starting_network(data, "own", wider, seed=0)
     older = save_checkpoint_bytes(build_network(NETWORK, 0, CHANNELS_0_1))
     with pytest.raises(ArtifactError, match=r"own takes the input channels.*of an older program"):
         starting_network(older, "own", NETWORK)

@@ -12,6 +12,7 @@ import pytest
 import stages.folds
 from pipeline.config import RunConfig, load_run_config
 from pipeline.config.judged import folds_config, holdout_config, judged_config
+from pipeline.config.learning import NetworkConfig
 from pipeline.config.written import as_toml
 from pipeline.errors import ArtifactError, ConfigError
 from pipeline.execution import RunFolder
@@ -117,6 +118,14 @@ def test_folds_begin_with_a_run_that_held_out_the_meshes_and_with_no_other(
     assert started is not None
     assert save_checkpoint_bytes(started) == path.read_bytes()
     assert starting(RunConfig(), own, tmp_path) is None
+    deeper = NetworkConfig(layers=20)
+    trained_on = config.model_copy(update={"network": deeper})
+    started = starting(trained_on, own, tmp_path)
+    assert started is not None
+    assert started.config == deeper
+    as_it_is = trained_on.folds.model_copy(update={"trained": False})
+    with pytest.raises(ConfigError, match=r"has 18 layers .* wants 20"):
+        starting(trained_on.model_copy(update={"folds": as_it_is}), own, tmp_path)
 
 
 def test_what_a_start_began_with_must_have_held_out_the_meshes_too(
