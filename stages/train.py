@@ -6,6 +6,7 @@ the rest.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial, update_wrapper
 
 from loguru import logger
@@ -31,6 +32,7 @@ from pipeline.network.fine_tuning import measure_fine_tuning, starting_network
 from pipeline.network.fitted_baselines import fit_baselines
 from pipeline.network.ga_cnn import parameter_count
 from pipeline.network.held_out import measure_held_out
+from pipeline.network.interpolation import choose_between
 from pipeline.network.parallel import ALONE, Ranks, join_ranks
 from pipeline.network.samples import Samples
 from pipeline.network.sources import baseline_to_json
@@ -74,17 +76,17 @@ def build(stage: StageContext, ranks: Ranks = ALONE) -> Summary:
     )
     if not ranks.first:
         return {}
+    told: Summary = {}
+    if start and any(config.train.start_shares):
+        chosen = choose_between(start, trained.network, config.train, train_set.learned, val_set)
+        trained = replace(trained, network=chosen.network, val_mae=chosen.val_mae)
+        told = chosen.headline()
+    network = trained.network
     fitted = fit_baselines(train_set.fitted, config.gripper, config.train.baseline_samples)
-    figures = measure_held_out(
-        trained.network, config.train, fitted, train_set.count, val_set, test_set
-    )
-    tuned = (
-        measure_fine_tuning(start, trained.network, config.train, test_set.tensors)
-        if start
-        else None
-    )
+    figures = measure_held_out(network, config.train, fitted, train_set.count, val_set, test_set)
+    tuned = measure_fine_tuning(start, network, config.train, test_set.tensors) if start else None
     exported, predictor = export_for_control(stage, trained, test_set)
-    checkpoint = save_checkpoint_bytes(trained.network)
+    checkpoint = save_checkpoint_bytes(network)
     attached = {
         CHECKPOINT: checkpoint,
         EXPORT: exported,
@@ -92,19 +94,15 @@ def build(stage: StageContext, ranks: Ranks = ALONE) -> Summary:
     }
     for name, data in attached.items():
         publish_bytes(stage.folder.path / "train" / name, data)
-    parameters, kept = parameter_count(trained.network), trained.history[trained.kept_epoch]
+    parameters, kept = parameter_count(network), trained.history[trained.kept_epoch]
     result = result_message(config.network, parameters, kept, figures, tuned)
     write(stage, trained, result, attached)
     inference = runtimes_ms_a_grasp(
-        trained.network,
-        predictor,
-        test_set.cloud,
-        test_set.cloud_mask,
-        config.train.threads,
-        config.train.timed_batches,
+        *(network, predictor, test_set.cloud, test_set.cloud_mask),
+        *(config.train.threads, config.train.timed_batches),
     )
-    told = tuned.headline() if tuned else {}
-    return summary(stage, trained, figures, ranks) | told | {"inference_ms_a_grasp": inference}
+    told |= (tuned.headline() if tuned else {}) | {"inference_ms_a_grasp": inference}
+    return summary(stage, trained, figures, ranks) | told
 
 
 def training_set(stage: StageContext) -> TrainingSet:

@@ -102,6 +102,12 @@ class TrainConfig(Section):
         "with more layers than its network has, those are added to it; without, weights are drawn "
         "from the seed",
     )
+    start_shares: tuple[Annotated[float, Field(ge=0, lt=1)], ...] = Field(
+        (0.0,),
+        min_length=1,
+        description="with start: shares of the weights begun with to mix into those trained; the "
+        "network is that of least error on val [1]",
+    )
     further_runs: tuple[str, ...] = Field(
         (),
         description="folders of other runs, beside run.toml: their training samples are learnt "
@@ -147,6 +153,12 @@ class TrainConfig(Section):
         description="PyTorch compiles the network first, for more samples a second; it takes a "
         "minute and a C++ compiler, and one process trains",
     )
+
+    @model_validator(mode="after")
+    def _something_to_mix(self) -> Self:
+        if any(self.start_shares) and not self.start:
+            raise ValueError("start_shares mixes in the weights of the network that start names")
+        return self
 
     @model_validator(mode="after")
     def _windows_stand_alone(self) -> Self:

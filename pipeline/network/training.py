@@ -51,6 +51,7 @@ from pipeline.progress import progress
 
 # Rises whenever the loop changes what it computes: a state of another version is not continued.
 STATE_VERSION = 3
+_NOT_OF_THE_LOOP = {"start_shares"}  # what becomes of the trained weights afterwards
 SAVE_EVERY_S = 120.0  # what a kill may cost; a state of 52 layers takes a third of a second
 
 Batch = tuple[Float[Tensor, "b c h w"], Float[Tensor, " b"]]
@@ -347,7 +348,7 @@ def _identity(
     """All that the result depends on, as text: only a state of the same is continued."""
     parts = {
         "version": STATE_VERSION,
-        "train": config.model_dump(mode="json"),
+        "train": config.model_dump(mode="json", exclude=_NOT_OF_THE_LOOP),
         "network": network.model_dump(mode="json"),
         "channels": CHANNELS,
         "seed": seed,

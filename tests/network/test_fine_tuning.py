@@ -87,6 +87,18 @@ def test_a_state_that_began_otherwise_is_not_continued(
     assert save_checkpoint_bytes(after_another.network) == save_checkpoint_bytes(alone.network)
 
 
+def test_other_shares_of_the_start_train_nothing_anew(
+    start: GaCnn, known: GraspTensors, tmp_path: Path
+) -> None:
+    config = CONFIG.model_copy(update={"epochs": 1, "start": "released"})
+    once = train(config, NETWORK, 1, known, known, tmp_path, ignored, start=start)
+    epochs: list[EpochMetrics] = []
+    shared = config.model_copy(update={"start_shares": (0.0, 0.5)})
+    again = train(shared, NETWORK, 1, known, known, tmp_path, epochs.append, start=start)
+    assert epochs == []
+    assert save_checkpoint_bytes(again.network) == save_checkpoint_bytes(once.network)
+
+
 def test_a_network_of_another_kind_is_refused_by_name(start: GaCnn) -> None:
     data = save_checkpoint_bytes(start)
     assert save_checkpoint_bytes(starting_network(data, "own", NETWORK)) == data
