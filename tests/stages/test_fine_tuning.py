@@ -26,9 +26,14 @@ def test_a_run_begins_with_the_network_of_another(run: RunFolder, tmp_path: Path
         copy = shutil.copytree if (run.path / name).is_dir() else shutil.copy
         copy(run.path / name, folder.path / name)
     shutil.copy(run.path / "train" / CHECKPOINT_FILE, folder.path / "mine.safetensors")
-    folder.config.write_text(TINY.replace("epochs = 2", 'epochs = 1\nstart = "mine.safetensors"'))
+    begun = 'epochs = 1\nstart = "mine.safetensors"\nstart_shares = [0.0, 0.5]'
+    folder.config.write_text(TINY.replace("epochs = 2", begun))
     stage = stage_context(TRAIN, folder, inputs_of, None, workers=1)
-    told = train.build(stage)["fine_tuning"]
+    summary = train.build(stage)
+    by_share = summary["val_mae_by_start_share"]
+    assert summary["start_share"] == float(min(by_share, key=by_share.__getitem__))
+    assert set(by_share) == {"0", "0.5"}
+    told = summary["fine_tuning"]
     assert told["own_before"] > 0
     assert told["released_grasps"] == 600
     with open_artifact(stage.output) as artifact:
