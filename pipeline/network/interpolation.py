@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 import torch
 from jaxtyping import Float, Integer
-from torch import Tensor, nn
+from torch import Tensor
+from torch.optim.swa_utils import update_bn
 
 from pipeline.config.learning import TrainConfig
 from pipeline.network.by_object import GRASPABLE_FROM
@@ -129,17 +130,8 @@ def interpolated(
             for name, tensor in trained.state_dict().items()
         }
     )
-    norms = [module for module in network.modules() if isinstance(module, nn.BatchNorm2d)]
-    momentum = [norm.momentum for norm in norms]
-    for norm in norms:
-        norm.reset_running_stats()
-        norm.momentum = None  # the plain mean over all batches
-    network.train()
     with reproducible(threads), torch.no_grad():
-        for inputs in _some_inputs(learned):
-            network(inputs)
-    for norm, before in zip(norms, momentum, strict=True):
-        norm.momentum = before
+        update_bn(_some_inputs(learned), network)
     return network.eval()
 
 
