@@ -26,7 +26,7 @@ from pipeline.network.samples import SampleReader, Samples
 from pipeline.spread import choose_evenly
 
 _STATISTICS_CLOUDS = 10_240  # that the norms take their means and variances from
-_AT_A_TIME = 512
+_AT_A_TIME = 512  # clouds: as many as a batch of the larger trainings, some 100 MB of maps
 
 
 @dataclass(frozen=True)
