@@ -16,7 +16,7 @@ from torch import Tensor
 from torch.optim.swa_utils import update_bn
 
 from pipeline.config.learning import TrainConfig
-from pipeline.network.by_object import GRASPABLE_FROM
+from pipeline.network.by_object import errors_by_object
 from pipeline.network.canonical import network_input
 from pipeline.network.figures import mean_absolute_error
 from pipeline.network.ga_cnn import GaCnn, build_network
@@ -157,8 +157,9 @@ def graspable_error(
     predicted: Float[np.ndarray, " n"],
 ) -> float:
     """Mean over objects that can be gripped of mean |q̂ − q|; over all where none can."""
-    owner, quality = np.asarray(object_index), np.asarray(quality)
-    _, owner, counts = np.unique(owner, return_inverse=True, return_counts=True)
-    errors = np.bincount(owner, np.abs(predicted - quality)) / counts
-    graspable = np.bincount(owner, quality) / counts > GRASPABLE_FROM
-    return float(errors[graspable].mean() if graspable.any() else errors.mean())
+    names = [str(index) for index in range(int(np.max(object_index)) + 1)]
+    unweighted = np.ones(len(quality))
+    errors = errors_by_object(names, object_index, quality, predicted, predicted, unweighted)
+    return float(
+        np.mean([one.mae for one in errors if one.graspable] or [one.mae for one in errors])
+    )
