@@ -12,13 +12,14 @@ from hypothesis import strategies as st
 from pipeline.config.objects import FIRST_KINDS, ObjectsConfig, SolidKind
 from pipeline.errors import MeshError
 from pipeline.geometry.mesh import Mesh
-from pipeline.geometry.random_solids import KINDS, bodies, random_solid
+from pipeline.geometry.random_solids import KINDS, bodies, random_solid, relief
 from pipeline.geometry.random_solids.catalogued import solid_names
 from pipeline.geometry.random_solids.skins import mark, warp
 from pipeline.geometry.shape import nsvr, shape_class, volume
 from pipeline.geometry.topology import components, is_closed
 
 DRAWN = 40
+FURTHER_KINDS = [kind for kind in KINDS if kind not in FIRST_KINDS]
 
 
 @lru_cache
@@ -62,17 +63,17 @@ def test_shares_of_the_first_kinds_are_all() -> None:
     assert tuple(KINDS) == get_args(SolidKind)
 
 
-@pytest.mark.parametrize("kind", ["dish", "grooved", "row"])
+@pytest.mark.parametrize("kind", FURTHER_KINDS)
 @pytest.mark.parametrize("number", range(5))
-def test_household_kinds_are_one_closed_body(kind: str, number: int) -> None:
+def test_further_kinds_are_one_closed_body(kind: str, number: int) -> None:
     mesh = random_solid(np.random.default_rng([12, number]), [kind])
     assert is_closed(mesh)
     assert len(components(mesh.faces)) == 1
     assert volume(mesh) > 0
 
 
-@pytest.mark.parametrize("kind", ["dish", "grooved", "row"])
-def test_bodies_of_a_household_are_drawn_in_one_piece(kind: str) -> None:
+@pytest.mark.parametrize("kind", FURTHER_KINDS)
+def test_further_bodies_are_drawn_in_one_piece(kind: str) -> None:
     """What falls apart would lose all pieces but the largest."""
     for seed in range(60):
         assert len(KINDS[kind][0](np.random.default_rng([1, seed])).decompose()) == 1
@@ -93,6 +94,44 @@ def test_a_dish_is_a_shell_around_a_hollow() -> None:
 def test_grooves_take_little_and_leave_the_outline() -> None:
     body = KINDS["grooved"][0](np.random.default_rng(0))
     assert 0.6 * body.hull().volume() < body.volume() < body.hull().volume()
+
+
+def test_a_ringed_body_is_turned_about_its_axis() -> None:
+    for seed in range(60):
+        body = KINDS["ringed"][0](np.random.default_rng([1, seed]))
+        quarter = body.rotate((0, 0, 90))
+        assert (body - quarter).volume() < 1e-6 * body.volume()
+
+
+def test_ringed_ends_are_no_planes() -> None:
+    """What a pad meets rises and falls within its radius, on most of the ends that are drawn."""
+    relief_m = [float(np.ptp(relief._end(0.03, np.random.default_rng(s))[:, 1])) for s in range(60)]
+    assert np.median(relief_m) > 0.001
+    assert max(relief_m) < 0.03
+
+
+@given(seed=st.integers(0, 2**32 - 1), x=st.floats(0.02, 0.1), y=st.floats(0.02, 0.1))
+def test_tiles_cover_their_face_and_none_lies_on_another(seed: int, x: float, y: float) -> None:
+    tiles = np.array(relief._tiles(np.array([2 * x, 2 * y]), np.random.default_rng(seed)))
+    low, high = tiles[:, :2], tiles[:, 2:]
+    assert np.all(high > low)
+    assert np.prod(high - low, axis=1).sum() == pytest.approx(4 * x * y)
+    assert np.allclose(low.min(axis=0), (-x, -y))
+    assert np.allclose(high.max(axis=0), (x, y))
+    shared = np.minimum(high[:, None], high) - np.maximum(low[:, None], low)
+    over = np.prod(np.clip(shared, 0.0, None), axis=2)
+    np.fill_diagonal(over, 0.0)
+    assert over.max() < 1e-12
+
+
+def test_tiles_lie_at_heights_of_their_own() -> None:
+    """Above the block, more than one height is the highest of its tile: no flat face is left."""
+    uneven = 0
+    for seed in range(60):
+        body = KINDS["tiled"][0](np.random.default_rng([1, seed]))
+        height = np.array(body.to_mesh64().vert_properties)[:, 2]
+        uneven += len(np.unique(np.round(height[height > 0.9 * height.max()], 5))) > 1
+    assert uneven > 50
 
 
 @settings(deadline=None, max_examples=30)
