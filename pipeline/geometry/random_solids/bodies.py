@@ -30,6 +30,11 @@ REACH_M = 0.06  # half of a body's longest side, about
 _PROFILE_POINTS = 40  # along a smooth outline; steps of 3 mm
 
 
+def log_uniform(rng: np.random.Generator, least: float, most: float) -> float:
+    """A positive number between two bounds, as often in each equal factor between them."""
+    return math.exp(rng.uniform(math.log(least), math.log(most)))
+
+
 def compact_body(rng: np.random.Generator) -> Solid:
     """A superquadric: from box over ellipsoid to double cone, stretched."""
     exponents = rng.uniform(0.15, 1.6, 2)

@@ -25,14 +25,14 @@ from pipeline.geometry.parametric.solids import (
     torus,
     union,
 )
-from pipeline.geometry.random_solids.bodies import REACH_M
+from pipeline.geometry.random_solids.bodies import REACH_M, log_uniform
 
 _PROFILE_POINTS = 32  # along a dish's section; steps of 3 mm
 
 
 def dish(rng: np.random.Generator) -> Solid:
     """A shell whose section is an arc, at times with a flat base, flange, bead or foot ring."""
-    wall = REACH_M * math.exp(rng.uniform(math.log(0.03), math.log(0.13)))
+    wall = REACH_M * log_uniform(rng, 0.03, 0.13)
     middle = _dish_section(rng)
     step = np.gradient(middle, axis=0)
     normal = np.column_stack([-step[:, 1], step[:, 0]])
@@ -59,7 +59,7 @@ def dish(rng: np.random.Generator) -> Solid:
 def _dish_section(rng: np.random.Generator) -> Float[np.ndarray, "n 2"]:
     """The middle of a dish's wall from its axis to its rim: radius and height."""
     base = REACH_M * rng.uniform(0.0, 0.75)
-    depth = REACH_M * math.exp(rng.uniform(math.log(0.12), math.log(1.4)))
+    depth = REACH_M * log_uniform(rng, 0.12, 1.4)
     turn = np.linspace(0.0, rng.uniform(0.9, math.pi / 2), _PROFILE_POINTS)
     bend = rng.uniform(0.7, 1.4, 2)
     out, up = np.sin(turn) ** bend[0], 1.0 - np.cos(turn) ** bend[1]

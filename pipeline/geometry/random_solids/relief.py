@@ -16,10 +16,10 @@ import numpy as np
 from jaxtyping import Float
 
 from pipeline.geometry.parametric.solids import ROUND, Section, Solid, box, cylinder, union
-from pipeline.geometry.random_solids.bodies import REACH_M
+from pipeline.geometry.random_solids.bodies import REACH_M, log_uniform
 
-_END_POINTS = 48  # along an end's radius; steps of a millimetre, less than a groove's width
-_LEAST_TILE_M = 0.009  # a pad of 25 mm lies on six such in a row
+_END_POINTS = 48  # along an end's radius; steps of 1.3 mm at most, less than a groove's width
+_LEAST_TILE_M = 0.009  # six such in a row are as long as a pad is wide
 
 Rectangle = tuple[float, float, float, float]  # least x and y, most x and y [m]
 
@@ -27,7 +27,7 @@ Rectangle = tuple[float, float, float, float]  # least x and y, most x and y [m]
 def ringed_body(rng: np.random.Generator) -> Solid:
     """A turned body, full or hollow from one side, whose ends have domes, rims and grooves."""
     radius = REACH_M * rng.uniform(0.35, 1.0)
-    height = radius * math.exp(rng.uniform(math.log(0.25), math.log(2.2)))
+    height = radius * log_uniform(rng, 0.25, 2.2)
     taper = rng.uniform(0.75, 1.0) if rng.random() < 0.4 else 1.0
     top, bottom = _end(radius * taper, rng), _end(radius, rng)
     bottom[:, 1] = np.minimum(-bottom[:, 1], 0.45 * height)
@@ -43,7 +43,7 @@ def ringed_body(rng: np.random.Generator) -> Solid:
 
 
 def _end(radius_m: float, rng: np.random.Generator) -> Float[np.ndarray, "n 2"]:
-    """Radius and height of an end from its axis to its border, where its height is near 0 [m]."""
+    """Profile of an end, from its axis to its border: radius, and height over a plane [m]."""
     r = np.linspace(0.0, radius_m, _END_POINTS)
     inside = r / radius_m
     height = np.zeros(_END_POINTS)
@@ -72,13 +72,13 @@ def _end(radius_m: float, rng: np.random.Generator) -> Float[np.ndarray, "n 2"]:
 
 def _drawn_depth(rng: np.random.Generator) -> float:
     """How deep a relief is: more often a fraction of a millimetre than several [m]."""
-    return math.exp(rng.uniform(math.log(0.0004), math.log(0.006)))
+    return log_uniform(rng, 0.0004, 0.006)
 
 
 def tiled_block(rng: np.random.Generator) -> Solid:
     """A block whose two wide faces are fields of tiles, some higher or askew, with gaps or none."""
     sides = 2 * REACH_M * np.array([1.0, rng.uniform(0.45, 1.0)])
-    uneven_m = math.exp(rng.uniform(math.log(0.0002), math.log(0.004)))
+    uneven_m = log_uniform(rng, 0.0002, 0.004)
     gap_m = 0.0 if rng.random() < 0.6 else rng.uniform(0.0003, 0.0025)
     chamfer_m = 0.0 if rng.random() < 0.5 else rng.uniform(0.0003, 0.002)
     askew = rng.uniform(0.0, 0.05) if rng.random() < 0.6 else 0.0
@@ -113,7 +113,7 @@ def _tiles(sides_m: Float[np.ndarray, " 2"], rng: np.random.Generator) -> list[R
 
 
 def _cut(part: Rectangle, times: int, rng: np.random.Generator) -> list[Rectangle]:
-    """A rectangle cut in two, and each half again, until it was cut so often or is small."""
+    """A rectangle cut in two, and its parts again, so many times; small ones stay whole."""
     x0, y0, x1, y1 = part
     along_x = (x1 - x0) * rng.uniform(0.5, 2.0) > y1 - y0
     low, high = (x0, x1) if along_x else (y0, y1)
