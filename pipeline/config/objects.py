@@ -64,6 +64,13 @@ class ObjectsConfig(ScaledSection):
     solid_kinds: tuple[SolidKind, ...] = Field(
         FIRST_KINDS, min_length=1, description="what kinds of bodies the solids are drawn from"
     )
+    grained_share: float = Field(
+        0.0,
+        ge=0,
+        le=1,
+        description="share of the solids whose skin has a relief of tenths of a millimetre, as "
+        "scans have [1]",
+    )
     stretched_copies: int = Field(
         0, ge=0, le=100, description="further shapes made of each training object by stretching it"
     )

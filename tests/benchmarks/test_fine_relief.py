@@ -5,7 +5,12 @@ import pytest
 import trimesh
 
 from pipeline.benchmarks import fine_relief
-from pipeline.benchmarks.fine_relief import poses_on, relief_in_labels, without_fine_relief
+from pipeline.benchmarks.fine_relief import (
+    poses_on,
+    relief_in_labels,
+    strays_from_quadrics_m,
+    without_fine_relief,
+)
 from pipeline.config import RunConfig
 from pipeline.geometry.mesh import Mesh
 
@@ -32,6 +37,15 @@ def test_approaches_point_out_of_the_surface() -> None:
     poses = poses_on(ball(0.0), 0.01, np.random.default_rng(0))
     outwards = poses[:, :3, 3] / np.linalg.norm(poses[:, :3, 3], axis=1, keepdims=True)
     assert np.einsum("ij,ij->i", poses[:, :3, 2], outwards).min() > 0.99
+
+
+def test_a_ball_is_no_further_from_quadrics_than_its_relief_is_high() -> None:
+    smooth_m, rough_m = (
+        strays_from_quadrics_m(ball(relief_m), np.random.default_rng(0)) for relief_m in (0.0, 1e-4)
+    )
+    assert smooth_m < 2e-6
+    # Between vertices the faces are flat, so that their points stray less than vertices do.
+    assert 0.4e-4 < rough_m < 1e-4
 
 
 def test_a_rough_ball_seals_worse_than_it_looks(monkeypatch: pytest.MonkeyPatch) -> None:

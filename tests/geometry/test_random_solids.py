@@ -24,7 +24,7 @@ FURTHER_KINDS = [kind for kind in KINDS if kind not in FIRST_KINDS]
 
 @lru_cache
 def solid(number: int) -> Mesh:
-    return random_solid(np.random.default_rng([11, number]), FIRST_KINDS)
+    return random_solid(np.random.default_rng([11, number]), FIRST_KINDS, 0.0)
 
 
 @pytest.mark.parametrize("number", range(DRAWN))
@@ -37,7 +37,7 @@ def test_each_is_one_closed_body(number: int) -> None:
 
 
 def test_the_same_stream_draws_the_same_bytes_and_another_one_does_not() -> None:
-    again = random_solid(np.random.default_rng([11, 0]), FIRST_KINDS)
+    again = random_solid(np.random.default_rng([11, 0]), FIRST_KINDS, 0.0)
     assert again.vertices_m.tobytes() == solid(0).vertices_m.tobytes()
     assert again.faces.tobytes() == solid(0).faces.tobytes()
     assert again.vertices_m.tobytes() != solid(1).vertices_m.tobytes()
@@ -66,7 +66,7 @@ def test_shares_of_the_first_kinds_are_all() -> None:
 @pytest.mark.parametrize("kind", FURTHER_KINDS)
 @pytest.mark.parametrize("number", range(5))
 def test_further_kinds_are_one_closed_body(kind: str, number: int) -> None:
-    mesh = random_solid(np.random.default_rng([12, number]), [kind])
+    mesh = random_solid(np.random.default_rng([12, number]), [kind], 0.0)
     assert is_closed(mesh)
     assert len(components(mesh.faces)) == 1
     assert volume(mesh) > 0

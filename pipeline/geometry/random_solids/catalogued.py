@@ -64,7 +64,7 @@ def solid_or_why_not(
     name, rng = drawn
 
     def make() -> CatalogueObject:
-        mesh = random_solid(rng, config.solid_kinds)
+        mesh = random_solid(rng, config.solid_kinds, config.grained_share)
         source = MeshSource(name, EMBEDDED, EMBEDDED, mesh, "m", "declared")
         return prepare_object(source, config, rng, cache)
 
