@@ -9,6 +9,7 @@ from pipeline.artifacts.named_inputs import (
     MASSES_FILE,
     RELEASED,
     STARTING_NETWORK,
+    named_networks,
     object_inputs,
     training_inputs,
 )
@@ -103,15 +104,17 @@ def learned_from(folder: RunFolder) -> dict[str, Path]:
     """What a training reads beside its shards; all of it is there, but the run's own objects."""
     train = load_run_config(folder.config).train
     inputs = training_inputs(folder.path, train)
-    if (start := inputs.get(STARTING_NETWORK)) and not start.is_file():
-        run = starting_run(folder, train.start)
-        remedy = f"Put a {CHECKPOINT_FILE} there"
-        if run.config.is_file():
-            remedy = f"Train that run first: make train RUN={run.path.resolve().name}"
-        raise ConfigError(
-            f"{start} is missing, and train.start names it",
-            f"{remedy}, or write train.start = '{RELEASED}'",
-        )
+    for name, named in named_networks(train).items():
+        if not inputs[name].is_file():
+            run = starting_run(folder, named)
+            remedy = f"Put a {CHECKPOINT_FILE} there"
+            if run.config.is_file():
+                remedy = f"Train that run first: make train RUN={run.path.resolve().name}"
+            key = "train.start" if name == STARTING_NETWORK else "train.teachers"
+            raise ConfigError(
+                f"{inputs[name]} is missing, and {key} names it",
+                f"{remedy}, or write '{RELEASED}' in its place",
+            )
     if further_runs(folder, train.further_runs):
         # What they learn from is held against the objects that this run holds out.
         inputs["objects.mcap"] = folder.artifact(OBJECTS.name)

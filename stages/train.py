@@ -12,7 +12,7 @@ from functools import partial, update_wrapper
 from loguru import logger
 
 from pipeline.artifacts import ArtifactWriter, publish_bytes
-from pipeline.artifacts.named_inputs import ATTEMPTS, STARTING_NETWORK
+from pipeline.artifacts.named_inputs import ATTEMPTS, STARTING_NETWORK, TEACHERS, inputs_under
 from pipeline.execution import StageContext, Summary, stage_command
 from pipeline.execution.further_runs import check_further_runs
 from pipeline.execution.training_samples import TrainingSet, open_training_set, readers_ahead
@@ -36,6 +36,7 @@ from pipeline.network.interpolation import choose_between
 from pipeline.network.parallel import ALONE, Ranks, join_ranks
 from pipeline.network.samples import Samples
 from pipeline.network.sources import baseline_to_json
+from pipeline.network.teachers import teaching_network
 from pipeline.network.timing import runtimes_ms_a_grasp
 from pipeline.network.training import TrainedNetwork, train
 from pipeline.network.training_figures import EpochMetrics, TestFigures
@@ -51,13 +52,13 @@ def build(stage: StageContext, ranks: Ranks = ALONE) -> Summary:
     """Train GA-CNN on the train split, stop by the val split, report on the test split."""
     config = stage.config
     train_set = training_set(stage)
-    val_set, test_set = (
-        cached_split(stage.upstream("shards"), name, stage.folder.state(SAMPLES))
-        for name in ("val", "test")
-    )
+    shards, cache = stage.upstream("shards"), stage.folder.state(SAMPLES)
+    val_set, test_set = (cached_split(shards, name, cache) for name in ("val", "test"))
     begun = stage.inputs.get(STARTING_NETWORK)
     wanted = (config.network, config.seed)
     start = starting_network(begun.read_bytes(), str(begun), *wanted) if begun else None
+    paths = inputs_under(stage.inputs, TEACHERS)
+    teachers = [teaching_network(path.read_bytes(), str(path)) for path in paths]
     # On a CPU readers would take the cores that train.
     on_gpu = choose_device(config.train.device, ranks).type == "cuda"
     readers = max(stage.workers // ranks.count, 1) if on_gpu else 0
@@ -73,6 +74,7 @@ def build(stage: StageContext, ranks: Ranks = ALONE) -> Summary:
         loader_workers=readers_ahead(readers, config.train.batch_size, val_set),
         show_progress=True,
         start=start,
+        teachers=teachers,
     )
     if not ranks.first:
         return {}
@@ -107,7 +109,7 @@ def build(stage: StageContext, ranks: Ranks = ALONE) -> Summary:
 
 def training_set(stage: StageContext) -> TrainingSet:
     """The train split, opened before anything is decoded; further runs' and tried contacts too."""
-    attempts = [path for name, path in sorted(stage.inputs.items()) if name.startswith(ATTEMPTS)]
+    attempts = inputs_under(stage.inputs, ATTEMPTS)
     cache = stage.folder.state(SAMPLES)
     if further := further_runs(stage.folder, stage.config.train.further_runs):
         check_further_runs(stage.upstream("objects"), stage.config, further)

@@ -3,6 +3,7 @@
 Provenance calls an input by a name that holds on every machine; here is the file behind it.
 """
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from pipeline.artifacts.listing import artifacts_in
@@ -13,6 +14,7 @@ FAMILIES_FILE = "families.toml"  # what a person declares to be alike
 MASSES_FILE = "masses.toml"  # what objects weigh
 ATTEMPTS = "attempts/"  # before the number of each input that ``train.attempts`` names
 STARTING_NETWORK = "start.safetensors"  # the input that ``train.start`` names
+TEACHERS = "teachers/"  # before the number of each network that ``train.teachers`` names
 FURTHER = "further/"  # before the number of each run that ``train.further_runs`` names
 FURTHER_FILES = ("objects.mcap", "shards.mcap")  # of each of them
 RELEASED = "released"  # what a person writes in a network's place
@@ -71,12 +73,22 @@ def training_inputs(run: Path, train: TrainConfig) -> dict[str, Path]:
     """
     logged = artifacts_in(run / named for named in train.attempts)
     found = {f"{ATTEMPTS}{number}": path for number, path in enumerate(logged)}
-    if train.start:
-        released = train.start == RELEASED
-        found[STARTING_NETWORK] = RELEASED_CHECKPOINT if released else run / train.start
+    for name, named in named_networks(train).items():
+        found[name] = RELEASED_CHECKPOINT if named == RELEASED else run / named
     for number, named in enumerate(train.further_runs):
         found |= {f"{FURTHER}{number:03d}/{file}": run / named / file for file in FURTHER_FILES}
     return found
+
+
+def inputs_under(inputs: Mapping[str, Path], prefix: str) -> list[Path]:
+    """The files of the inputs whose names begin alike, in the order of their numbers."""
+    return [path for name, path in sorted(inputs.items()) if name.startswith(prefix)]
+
+
+def named_networks(train: TrainConfig) -> dict[str, str]:
+    """The networks that [train] names, as it names them, by the name of the input."""
+    found = {STARTING_NETWORK: train.start} if train.start else {}
+    return found | {f"{TEACHERS}{number:03d}": one for number, one in enumerate(train.teachers)}
 
 
 def named_inputs(run: Path, config: RunConfig, mesh_dir: Path | None) -> dict[str, Path]:

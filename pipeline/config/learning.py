@@ -108,6 +108,17 @@ class TrainConfig(Section):
         description="with start: shares of the weights begun with to mix into those trained; the "
         "network is that of least error on val [1]",
     )
+    teachers: tuple[str, ...] = Field(
+        (),
+        description="networks, each 'released' or a .safetensors file beside run.toml, whose mean "
+        "prediction of each cloud is learnt beside its label",
+    )
+    teacher_share: float = Field(
+        0.7,
+        ge=0,
+        le=1,
+        description="weight of the teachers in the loss; the label has the rest [1]",
+    )
     further_runs: tuple[str, ...] = Field(
         (),
         description="folders of other runs, beside run.toml: their training samples are learnt "

@@ -13,7 +13,7 @@ takes, up to rounding.
 import json
 import math
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -46,6 +46,7 @@ from pipeline.network.resuming import (
     save_training_state,
 )
 from pipeline.network.samples import GraspTensors, SampleReader
+from pipeline.network.teachers import Teachers, training_loss
 from pipeline.network.training_figures import EpochMetrics
 from pipeline.progress import progress
 
@@ -102,6 +103,7 @@ def train(
     save_every_s: float = SAVE_EVERY_S,
     show_progress: bool = False,
     start: GaCnn | None = None,
+    teachers: Sequence[GaCnn] = (),
 ) -> TrainedNetwork:
     """Train a network; continue where an interrupted call with the same arguments stopped.
 
@@ -132,6 +134,8 @@ def train(
         Whether to show a progress bar for each epoch.
     start
         A network like ``network`` whose weights are the first ones; None: drawn from the seed.
+    teachers
+        Networks whose mean prediction is learned beside the label; none: the label alone.
 
     Returns
     -------
@@ -148,7 +152,7 @@ def train(
         The resume state is damaged.
     """
     device = choose_device(config.device, ranks)
-    identity = _identity(config, network, seed, train_set, val_set, device, start)
+    identity = _identity(config, network, seed, train_set, val_set, device, start, teachers)
     with reproducible(config.threads):
         model = build_network(network, seed)
         if start is not None:
@@ -166,6 +170,7 @@ def train(
             forward = DistributedDataParallel(model, forward_sync_buffers=False)
         if config.compiled:
             forward = compile_network(model, device, ranks)
+        taught_by = Teachers(teachers, config, device)
 
         batches_per_epoch = batch_count(len(train_set), config.batch_size)
         total_steps = config.epochs * batches_per_epoch
@@ -191,9 +196,8 @@ def train(
 
                 with mixed_precision(device, config.precision):
                     predicted = forward(inputs)
-                loss = nn.functional.smooth_l1_loss(
-                    predicted, quality, beta=config.loss_beta, reduction="sum"
-                )
+                taught = taught_by.mean_prediction(inputs) if teachers else None
+                loss = training_loss(predicted, quality, taught, config)
                 optimizer.zero_grad(set_to_none=True)
                 # Processes average their gradients: that of the batch's mean is what comes out.
                 (loss * ranks.count / len(batches[state.batch])).backward()
@@ -344,6 +348,7 @@ def _identity(
     val_set: GraspTensors,
     device: torch.device,
     start: GaCnn | None,
+    teachers: Sequence[GaCnn],
 ) -> str:
     """All that the result depends on, as text: only a state of the same is continued."""
     parts = {
@@ -357,5 +362,6 @@ def _identity(
         "device": device.type,
         "torch": torch.__version__,
         "start": checkpoint_digest(start) if start else None,
+        "teachers": [checkpoint_digest(each) for each in teachers],
     }
     return json.dumps(parts, sort_keys=True)

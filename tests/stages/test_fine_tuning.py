@@ -27,6 +27,7 @@ def test_a_run_begins_with_the_network_of_another(run: RunFolder, tmp_path: Path
         copy(run.path / name, folder.path / name)
     shutil.copy(run.path / "train" / CHECKPOINT_FILE, folder.path / "mine.safetensors")
     begun = 'epochs = 1\nstart = "mine.safetensors"\nstart_shares = [0.0, 0.5]'
+    begun += '\nteachers = ["released", "mine.safetensors"]'
     folder.config.write_text(TINY.replace("epochs = 2", begun))
     stage = stage_context(TRAIN, folder, inputs_of, None, workers=1)
     summary = train.build(stage)
@@ -52,6 +53,9 @@ def test_the_released_network_is_a_name_and_a_missing_file_is_told(tmp_path: Pat
     assert inputs_of(TRAIN, folder, None)[STARTING_NETWORK] == RELEASED_FOLDER / CHECKPOINT_FILE
     folder.config.write_text('[train]\nstart = "none.safetensors"\n')
     with pytest.raises(ConfigError, match=r"none\.safetensors is missing, and train\.start names"):
+        inputs_of(TRAIN, folder, None)
+    folder.config.write_text('[train]\nteachers = ["released", "none.safetensors"]\n')
+    with pytest.raises(ConfigError, match=r"none\.safetensors is missing, and train\.teachers"):
         inputs_of(TRAIN, folder, None)
     folder.config.write_text('[train]\nstart = "../solids/train/ga_cnn.safetensors"\n')
     with pytest.raises(ConfigError, match=r"Put a ga_cnn\.safetensors there, or"):

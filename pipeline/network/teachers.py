@@ -1,0 +1,114 @@
+"""Learning from several trained networks beside the labels: distillation into one.
+
+Networks that were trained on other grasps, or in another order, err on other grasps, and the mean
+of their predictions errs less than each. One network that learns this mean beside the label comes
+near to it, at the time of one (Hinton, Vinyals and Dean, 2015; Furlanello et al., 2018). The label
+of one noisy cloud is one draw of what clouds like it have; the mean stands for many.
+"""
+
+from collections.abc import Sequence
+
+import torch
+from jaxtyping import Float
+from torch import Tensor, nn
+
+from pipeline.config.learning import TrainConfig
+from pipeline.errors import ArtifactError, ContentError
+from pipeline.network.checkpoint import load_checkpoint_bytes
+from pipeline.network.devices import Predict, compile_network, mixed_precision
+from pipeline.network.ga_cnn import GaCnn
+from pipeline.network.input_channels import CHANNELS
+from pipeline.network.parallel import ALONE
+
+
+def teaching_network(data: bytes, named: str) -> GaCnn:
+    """A network to learn from, of any depth and width.
+
+    Parameters
+    ----------
+    data
+        Its checkpoint.
+    named
+        What messages call it.
+
+    Returns
+    -------
+    The network, on the CPU.
+
+    Raises
+    ------
+    ArtifactError
+        The bytes are no network, or its input is an older program's.
+    """
+    try:
+        network = load_checkpoint_bytes(data)
+    except ContentError as error:
+        raise ArtifactError(f"{named}: {error.what}", error.remedy) from error
+    if network.channels != CHANNELS:
+        raise ArtifactError(
+            f"{named} takes the input channels {', '.join(network.channels)} of an older program",
+            "Leave it out of train.teachers",
+        )
+    return network
+
+
+class Teachers:
+    """Trained networks that are asked together, and left as they are."""
+
+    def __init__(
+        self, networks: Sequence[GaCnn], config: TrainConfig, device: torch.device
+    ) -> None:
+        """Raise MachineError where ``config.compiled`` asks for a compiler that is not there."""
+        self._config, self._device = config, device
+        self._networks: list[Predict] = []
+        for network in networks:
+            ready = network.to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
+            ready.eval().requires_grad_(requires_grad=False)
+            self._networks.append(
+                compile_network(ready, device, ALONE) if config.compiled else ready
+            )
+
+    def __len__(self) -> int:
+        return len(self._networks)
+
+    def mean_prediction(self, inputs: Float[Tensor, "b c h w"]) -> Float[Tensor, " b"]:
+        """Mean q-hat of the networks, of canonical inputs, shape (b,)."""
+        with torch.no_grad(), mixed_precision(self._device, self._config.precision):
+            told = [network(inputs).float() for network in self._networks]
+        return torch.stack(told).mean(dim=0)
+
+
+def training_loss(
+    predicted: Float[Tensor, " b"],
+    quality: Float[Tensor, " b"],
+    taught: Float[Tensor, " b"] | None,
+    config: TrainConfig,
+) -> Float[Tensor, ""]:
+    """Sum over a batch of the smooth absolute error, against label and teachers.
+
+    Parameters
+    ----------
+    predicted
+        q-hat, shape (b,).
+    quality
+        q, shape (b,).
+    taught
+        Mean prediction of the teachers, shape (b,); None: the label alone counts.
+    config
+        ``loss_beta``, and ``teacher_share``, which weighs the teachers.
+
+    Returns
+    -------
+    The sum.
+    """
+    from_label = _smooth_error(predicted, quality, config.loss_beta)
+    if taught is None:
+        return from_label
+    from_teachers = _smooth_error(predicted, taught, config.loss_beta)
+    return (1.0 - config.teacher_share) * from_label + config.teacher_share * from_teachers
+
+
+def _smooth_error(
+    predicted: Float[Tensor, " b"], wanted: Float[Tensor, " b"], beta: float
+) -> Float[Tensor, ""]:
+    return nn.functional.smooth_l1_loss(predicted, wanted, beta=beta, reduction="sum")
