@@ -23,6 +23,7 @@ import typer
 from loguru import logger
 
 from pipeline.artifacts import ArtifactWriter, publish_bytes, read_provenance
+from pipeline.artifacts.named_inputs import named_networks
 from pipeline.config import RunConfig, load_run_config
 from pipeline.config.judged import folds_config
 from pipeline.config.learning import TrainConfig
@@ -151,8 +152,8 @@ def starting(config: RunConfig, contents: Mapping[str, str], runs_dir: Path) -> 
 def runs_behind(run: RunFolder) -> list[RunFolder]:
     """All runs whose samples a run's network learned from.
 
-    The run itself and those that its train.further_runs names; then the same of the run whose
-    network its train.start names, and so on back.
+    The run itself and those that its train.further_runs names; then the same of the runs whose
+    networks its train.start and train.teachers name, and so on back.
     """
     found: dict[Path, RunFolder] = {}
     followed: set[Path] = set()
@@ -164,14 +165,14 @@ def runs_behind(run: RunFolder) -> list[RunFolder]:
         followed.add(run.path.resolve())
         found[run.path.resolve()] = run
         wanted = load_run_config(run.config).train if run.config.is_file() else TrainConfig()
-        begun = [(wanted.start, starting_run(run, wanted.start))] if wanted.start else []
+        begun = [(one, starting_run(run, one)) for one in named_networks(wanted).values()]
         further = [(one, RunFolder(run.path / one)) for one in wanted.further_runs]
         for named, behind in begun + further:
             if named == RELEASED or not behind.artifact("objects").is_file():
                 raise ConfigError(
                     f"Run {run.path.name} learned from {named}, and which objects that knows is "
                     "not recorded",
-                    "Let train.start and train.further_runs name runs whose objects.mcap is there",
+                    "Let [train] name networks of runs, and runs, whose objects.mcap is there",
                 )
         todo += [behind for _, behind in begun]
         found |= {behind.path.resolve(): behind for _, behind in further}

@@ -181,3 +181,21 @@ def test_a_run_that_is_a_start_too_is_followed_back(tmp_path: Path) -> None:
         )
     found = {run.path.resolve().name for run in runs_behind(RunFolder(tmp_path / "last"))}
     assert found == {"last", "second", "first"}
+
+
+def test_a_teachers_runs_are_followed_back_too(tmp_path: Path) -> None:
+    """What a teacher learned from, its student knows."""
+    named = {
+        "first": "",
+        "taught_by": '[train]\nstart = "../first/train/w"\n',
+        "last": '[train]\nteachers = ["../taught_by/train/w"]\n',
+        "unknown": '[train]\nteachers = ["released"]\n',
+    }
+    for name, told in named.items():
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "objects.mcap").touch()
+        (tmp_path / name / "run.toml").write_text(told)
+    found = {run.path.resolve().name for run in runs_behind(RunFolder(tmp_path / "last"))}
+    assert found == {"last", "taught_by", "first"}
+    with pytest.raises(ConfigError, match="unknown learned from released, and which objects"):
+        runs_behind(RunFolder(tmp_path / "unknown"))
