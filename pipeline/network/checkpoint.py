@@ -11,7 +11,7 @@ from safetensors.torch import load, save
 from torch import Tensor
 
 from pipeline.config.learning import NetworkConfig
-from pipeline.errors import ConfigError, ContentError
+from pipeline.errors import ArtifactError, ConfigError, ContentError
 from pipeline.network.ga_cnn import GaCnn, build_network
 from pipeline.network.input_channels import CHANNELS, KNOWN_CHANNELS, Channels
 
@@ -89,6 +89,39 @@ def load_checkpoint_bytes(data: bytes) -> GaCnn:
     if not all(bool(torch.isfinite(tensor).all()) for tensor in tensors.values()):
         raise ContentError("network checkpoint holds weights that are not finite", _REMEDY)
     return network.eval()
+
+
+def network_of_this_program(data: bytes, named: str, remedy: str) -> GaCnn:
+    """Read the network of a checkpoint that takes the input which training makes today.
+
+    Parameters
+    ----------
+    data
+        Bytes that `save_checkpoint_bytes` made.
+    named
+        What messages call it.
+    remedy
+        What to do where its input is an older program's.
+
+    Returns
+    -------
+    The network, as `load_checkpoint_bytes` returns it.
+
+    Raises
+    ------
+    ArtifactError
+        The bytes are no network, or its input is an older program's.
+    """
+    try:
+        network = load_checkpoint_bytes(data)
+    except ContentError as error:
+        raise ArtifactError(f"{named}: {error.what}", error.remedy) from error
+    if network.channels != CHANNELS:
+        raise ArtifactError(
+            f"{named} takes the input channels {', '.join(network.channels)} of an older program",
+            remedy,
+        )
+    return network
 
 
 def _check_shapes(config: NetworkConfig, channels: Channels, tensors: Mapping[str, Tensor]) -> None:

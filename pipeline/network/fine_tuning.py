@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float
 from pipeline.config.learning import NetworkConfig, TrainConfig
 from pipeline.errors import ArtifactError, ConfigError, ContentError
 from pipeline.network.checkpoint import (
-    load_checkpoint_bytes,
+    network_of_this_program,
     tensors_from_bytes,
     tensors_to_bytes,
 )
@@ -19,7 +19,6 @@ from pipeline.network.deepening import can_be_deepened, deepened
 from pipeline.network.figures import mean_absolute_error
 from pipeline.network.ga_cnn import GaCnn
 from pipeline.network.inference import predict
-from pipeline.network.input_channels import CHANNELS
 from pipeline.network.released_files import (
     RELEASED_FOLDER,
     TEST_GRASPS_FILE,
@@ -58,15 +57,8 @@ def starting_network(
     ConfigError
         It is no network as the run wants one, nor one to be made deeper.
     """
-    try:
-        network = load_checkpoint_bytes(data)
-    except ContentError as error:
-        raise ArtifactError(f"{named}: {error.what}", error.remedy) from error
-    if network.channels != CHANNELS:
-        raise ArtifactError(
-            f"{named} takes the input channels {', '.join(network.channels)} of an older program",
-            "Begin with a network of this program, or without train.start",
-        )
+    remedy = "Begin with a network of this program, or without train.start"
+    network = network_of_this_program(data, named, remedy)
     own = network.config
     if seed is not None and can_be_deepened(own, wanted):
         return deepened(network, wanted, seed)

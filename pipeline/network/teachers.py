@@ -13,11 +13,9 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from pipeline.config.learning import TrainConfig
-from pipeline.errors import ArtifactError, ContentError
-from pipeline.network.checkpoint import load_checkpoint_bytes
+from pipeline.network.checkpoint import network_of_this_program
 from pipeline.network.devices import Predict, compile_network, mixed_precision
 from pipeline.network.ga_cnn import GaCnn
-from pipeline.network.input_channels import CHANNELS
 from pipeline.network.parallel import ALONE
 
 
@@ -40,16 +38,7 @@ def teaching_network(data: bytes, named: str) -> GaCnn:
     ArtifactError
         The bytes are no network, or its input is an older program's.
     """
-    try:
-        network = load_checkpoint_bytes(data)
-    except ContentError as error:
-        raise ArtifactError(f"{named}: {error.what}", error.remedy) from error
-    if network.channels != CHANNELS:
-        raise ArtifactError(
-            f"{named} takes the input channels {', '.join(network.channels)} of an older program",
-            "Leave it out of train.teachers",
-        )
-    return network
+    return network_of_this_program(data, named, "Leave it out of train.teachers")
 
 
 class Teachers:
@@ -63,13 +52,10 @@ class Teachers:
         self._networks: list[Predict] = []
         for network in networks:
             ready = network.to(device, memory_format=torch.channels_last)  # type: ignore[call-overload]
-            ready.eval().requires_grad_(requires_grad=False)
+            ready.eval()
             self._networks.append(
                 compile_network(ready, device, ALONE) if config.compiled else ready
             )
-
-    def __len__(self) -> int:
-        return len(self._networks)
 
     def mean_prediction(self, inputs: Float[Tensor, "b c h w"]) -> Float[Tensor, " b"]:
         """Mean q-hat of the networks, of canonical inputs, shape (b,)."""

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.config.learning import NetworkConfig, TrainConfig
 from pipeline.errors import ArtifactError, ConfigError
 from pipeline.network.checkpoint import save_checkpoint_bytes
 from pipeline.network.fine_tuning import (
@@ -20,26 +19,15 @@ from pipeline.network.input_channels import CHANNELS_0_1
 from pipeline.network.samples import GraspTensors
 from pipeline.network.training import TrainedNetwork, train
 from pipeline.network.training_figures import EpochMetrics
+from tests.network.conftest import TAUGHT as NETWORK
+from tests.network.conftest import TEACHING as CONFIG
+from tests.network.conftest import ignored
 from tests.network.planes import planes_with_holes
 
-NETWORK = NetworkConfig(layers=18, channels=(8, 8, 16, 32))
-CONFIG = TrainConfig(epochs=3, batch_size=64, learning_rate=4e-3, threads=1, device="cpu")
 
-
-def ignored(metrics: EpochMetrics) -> None:
-    assert metrics.samples > 0
-
-
-@pytest.fixture(scope="module")
-def known() -> GraspTensors:
-    return planes_with_holes(200, seed=1)
-
-
-@pytest.fixture(scope="module")
-def start(known: GraspTensors, tmp_path_factory: pytest.TempPathFactory) -> GaCnn:
-    learned = planes_with_holes(600, seed=2)
-    state = tmp_path_factory.mktemp("start")
-    return train(CONFIG, NETWORK, 1, learned, known, state, ignored).network
+@pytest.fixture
+def start(taught_planes: GaCnn) -> GaCnn:
+    return taught_planes
 
 
 def contrary(count: int, seed: int) -> GraspTensors:

@@ -9,7 +9,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.config.learning import NetworkConfig, TrainConfig
+from pipeline.config.learning import NetworkConfig
 from pipeline.errors import ArtifactError
 from pipeline.network.canonical import network_input
 from pipeline.network.checkpoint import save_checkpoint_bytes
@@ -20,27 +20,17 @@ from pipeline.network.input_channels import CHANNELS_0_1
 from pipeline.network.samples import GraspTensors
 from pipeline.network.teachers import Teachers, teaching_network, training_loss
 from pipeline.network.training import train
-from pipeline.network.training_figures import EpochMetrics
+from tests.network.conftest import TAUGHT as NETWORK
+from tests.network.conftest import TEACHING as CONFIG
+from tests.network.conftest import ignored
 from tests.network.planes import planes_with_holes
 
-NETWORK = NetworkConfig(layers=18, channels=(8, 8, 16, 32))
-CONFIG = TrainConfig(epochs=3, batch_size=64, learning_rate=4e-3, threads=1, device="cpu")
 CPU = torch.device("cpu")
 
 
-def ignored(metrics: EpochMetrics) -> None:
-    assert metrics.samples > 0
-
-
-@pytest.fixture(scope="module")
-def known() -> GraspTensors:
-    return planes_with_holes(200, seed=1)
-
-
-@pytest.fixture(scope="module")
-def teacher(known: GraspTensors, tmp_path_factory: pytest.TempPathFactory) -> GaCnn:
-    learned = planes_with_holes(600, seed=2)
-    return train(CONFIG, NETWORK, 1, learned, known, tmp_path_factory.mktemp("t"), ignored).network
+@pytest.fixture
+def teacher(taught_planes: GaCnn) -> GaCnn:
+    return taught_planes
 
 
 def predicted(network: GaCnn, samples: GraspTensors) -> np.ndarray:
