@@ -4,15 +4,20 @@ Networks that were trained on other grasps, or in another order, err on other gr
 of their predictions errs less than each. One network that learns this mean beside the label comes
 near to it, at the time of one (Hinton, Vinyals and Dean, 2015; Furlanello et al., 2018). The label
 of one noisy cloud is one draw of what clouds like it have; the mean stands for many.
+
+Each teacher is asked in a turn of its own, drawn for each batch: turned or mirrored, q is the same
+(`canonical`) and a network's answer only nearly so. What is learned is then, on average over
+batches, the mean of each teacher over all eight turns, which errs less than its answer in one.
 """
 
 from collections.abc import Sequence
 
 import torch
-from jaxtyping import Float
+from jaxtyping import Float, Int
 from torch import Tensor, nn
 
 from pipeline.config.learning import TrainConfig
+from pipeline.network.canonical import apply_symmetry
 from pipeline.network.checkpoint import network_of_this_program
 from pipeline.network.devices import Predict, compile_network, mixed_precision
 from pipeline.network.ga_cnn import GaCnn
@@ -57,11 +62,34 @@ class Teachers:
                 compile_network(ready, device, ALONE) if config.compiled else ready
             )
 
-    def mean_prediction(self, inputs: Float[Tensor, "b c h w"]) -> Float[Tensor, " b"]:
-        """Mean q-hat of the networks, of canonical inputs, shape (b,)."""
+    def mean_prediction(
+        self, inputs: Float[Tensor, "b c h w"], turns: Int[Tensor, " t"]
+    ) -> Float[Tensor, " b"]:
+        """Mean q-hat of the networks, each asked in its own turn.
+
+        Parameters
+        ----------
+        inputs
+            Canonical inputs, shape (b, c, h, w).
+        turns
+            For each network the element of the square's symmetries by which the whole batch is
+            turned or mirrored before it is asked, shape (t,).
+
+        Returns
+        -------
+        Shape (b,).
+        """
+        views = [turned(inputs, turn) for turn in turns]
         with torch.no_grad(), mixed_precision(self._device, self._config.precision):
-            told = [network(inputs).float() for network in self._networks]
+            asked = zip(self._networks, views, strict=True)
+            told = [network(view).float() for network, view in asked]
         return torch.stack(told).mean(dim=0)
+
+
+def turned(inputs: Float[Tensor, "b c h w"], turn: Int[Tensor, ""]) -> Float[Tensor, "b c h w"]:
+    """A batch of canonical inputs, all turned or mirrored by one element."""
+    elements = turn.expand(len(inputs)).to(inputs.device)
+    return apply_symmetry(inputs, elements).contiguous(memory_format=torch.channels_last)
 
 
 def training_loss(

@@ -4,10 +4,10 @@ The figure of merit is the mean |q̂ − q| of Supplement IV. The loss is that a
 within ``loss_beta`` of the truth (smooth L1): its minimum is the median, which also minimises the
 figure of merit, and the squared part makes the last steps small where the error is near zero.
 
-Everything drawn at random follows from (seed, epoch): the order of the samples and the symmetries
-applied to them. A run killed at any batch resumes from the last state saved before it, and arrives
-at the same bytes as a run never killed. Several processes (``parallel``) take the steps that one
-takes, up to rounding.
+Everything drawn at random follows from (seed, epoch): the order of the samples, the symmetries
+applied to them and those in which teachers are asked. A run killed at any batch resumes from the
+last state saved before it, and arrives at the same bytes as a run never killed. Several processes
+(``parallel``) take the steps that one takes, up to rounding.
 """
 
 import json
@@ -51,7 +51,7 @@ from pipeline.network.training_figures import EpochMetrics
 from pipeline.progress import progress
 
 # Rises whenever the loop changes what it computes: a state of another version is not continued.
-STATE_VERSION = 3
+STATE_VERSION = 4
 _NOT_OF_THE_LOOP = {"start_shares"}  # what becomes of the trained weights afterwards
 SAVE_EVERY_S = 120.0  # what a kill may cost; a state of 52 layers takes a third of a second
 
@@ -180,6 +180,7 @@ def train(
             rng = np.random.default_rng((seed, epoch))
             batches = epoch_batches(len(train_set), config.batch_size, rng, config.shuffle_window)
             symmetry = rng.integers(0, SYMMETRIES, len(train_set)) if config.augment else None
+            turns = torch.from_numpy(rng.integers(0, SYMMETRIES, (len(batches), len(teachers))))
             mine = part_of_rank(batches, ranks.rank, ranks.count)[state.batch :]
             loaded = load_batches(train_set, mine, loader_workers, pinned=device.type == "cuda")
             ready = preparing.watch(ready_batches(reading.watch(loaded), symmetry, device))
@@ -196,7 +197,9 @@ def train(
 
                 with mixed_precision(device, config.precision):
                     predicted = forward(inputs)
-                taught = taught_by.mean_prediction(inputs) if teachers else None
+                taught = None
+                if teachers:
+                    taught = taught_by.mean_prediction(inputs, turns[state.batch])
                 loss = training_loss(predicted, quality, taught, config)
                 optimizer.zero_grad(set_to_none=True)
                 # Processes average their gradients: that of the batch's mean is what comes out.

@@ -16,7 +16,7 @@ from pipeline.network.checkpoint import save_checkpoint_bytes
 from pipeline.network.figures import mean_absolute_error
 from pipeline.network.ga_cnn import GaCnn, build_network
 from pipeline.network.inference import predict
-from pipeline.network.input_channels import CHANNELS_0_1
+from pipeline.network.input_channels import CHANNELS_0_1, SYMMETRIES
 from pipeline.network.samples import GraspTensors
 from pipeline.network.teachers import Teachers, teaching_network, training_loss
 from pipeline.network.training import train
@@ -67,9 +67,59 @@ def test_teachers_say_the_mean_of_what_each_says(known: GraspTensors) -> None:
     networks = [build_network(NETWORK, seed) for seed in (3, 4)]
     inputs = network_input(torch.from_numpy(known.cloud[:40]), torch.from_numpy(known.mask[:40]))
     each = [predicted(network, known)[:40] for network in networks]
-    said = Teachers(networks, CONFIG, CPU).mean_prediction(inputs).numpy()
+    as_it_lies = torch.zeros(2, dtype=torch.long)
+    said = Teachers(networks, CONFIG, CPU).mean_prediction(inputs, as_it_lies).numpy()
     assert said == pytest.approx(np.mean(each, axis=0), abs=1e-6)
     assert said != pytest.approx(each[0], abs=1e-6)
+
+
+def test_asked_in_all_turns_teachers_say_what_is_predicted_averaged(
+    teacher: GaCnn, known: GraspTensors
+) -> None:
+    """Each of the two goes through the eight turns in an order of its own."""
+    cloud, mask = known.cloud[:40], known.mask[:40]
+    inputs = network_input(torch.from_numpy(cloud), torch.from_numpy(mask))
+    teachers, turns = Teachers([teacher, teacher], CONFIG, CPU), torch.arange(SYMMETRIES)
+    asked = torch.stack((turns, turns.roll(3)), dim=1)
+    said = [teachers.mean_prediction(inputs, each).numpy() for each in asked]
+    averaged = predict(teacher, cloud, mask, 64, 1, average_symmetries=True)
+    assert np.mean(said, axis=0) == pytest.approx(averaged, abs=1e-5)
+    assert said[0] != pytest.approx(averaged, abs=1e-5)
+
+
+def test_teachers_are_asked_in_turns_of_their_own_and_so_after_a_kill(
+    teacher: GaCnn, known: GraspTensors, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    once, asked = CONFIG.model_copy(update={"epochs": 1, "batch_size": 8}), []
+    say = Teachers.mean_prediction
+
+    def heard(self: Teachers, inputs: torch.Tensor, turns: torch.Tensor) -> torch.Tensor:
+        asked.append(tuple(turns.tolist()))
+        if len(asked) == kill_at:
+            raise KeyboardInterrupt
+        return say(self, inputs, turns)
+
+    def trained(folder: str) -> bytes:
+        found = train(
+            *(once, NETWORK, 1, known, known, tmp_path / folder, ignored),
+            save_every_s=0.0,
+            teachers=[teacher, teacher],
+        )
+        return save_checkpoint_bytes(found.network)
+
+    monkeypatch.setattr(Teachers, "mean_prediction", heard)
+    kill_at = 0
+    whole = trained("whole")
+    straight = list(asked)
+    assert all({turn[at] for turn in straight} == set(range(SYMMETRIES)) for at in (0, 1))
+    assert any(first != second for first, second in straight)
+    asked.clear()
+    kill_at = 12
+    with pytest.raises(KeyboardInterrupt):
+        trained("killed")
+    kill_at = 0
+    assert trained("killed") == whole
+    assert asked[:11] + asked[12:] == straight
 
 
 @settings(deadline=None)
