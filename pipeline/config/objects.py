@@ -8,7 +8,7 @@ from pipeline.config.section import LengthInMetres, ScaledSection, Section
 
 FEWEST_OBJECTS = 3  # one each for train, val and test
 FirstKind = Literal["compact", "lump", "revolved", "extruded", "joined", "hollow", "studded", "rod"]
-SolidKind = Literal[FirstKind, "dish", "grooved", "row", "ringed", "tiled"]
+SolidKind = Literal[FirstKind, "dish", "grooved", "row", "ringed", "tiled", "winged", "drilled"]
 # Drawn where run.toml names no kinds: those that there were first.
 FIRST_KINDS: tuple[SolidKind, ...] = get_args(FirstKind)
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pipeline.config.objects import FIRST_KINDS, ObjectsConfig, SolidKind
 from pipeline.errors import MeshError
 from pipeline.geometry.mesh import Mesh
-from pipeline.geometry.random_solids import KINDS, bodies, random_solid, relief
+from pipeline.geometry.random_solids import KINDS, bodies, fine_structure, random_solid, relief
 from pipeline.geometry.random_solids.catalogued import solid_names
 from pipeline.geometry.random_solids.skins import mark, warp
 from pipeline.geometry.shape import nsvr, shape_class, volume
@@ -132,6 +132,30 @@ def test_tiles_lie_at_heights_of_their_own() -> None:
         height = np.array(body.to_mesh64().vert_properties)[:, 2]
         uneven += len(np.unique(np.round(height[height > 0.9 * height.max()], 5))) > 1
     assert uneven > 50
+
+
+def test_wings_are_thin_and_reach_far() -> None:
+    """A pad overhangs them: the hull holds much more than the body does."""
+    shares = []
+    for seed in range(60):
+        body = KINDS["winged"][0](np.random.default_rng([1, seed]))
+        shares.append(body.volume() / body.hull().volume())
+    assert np.median(shares) < 0.6
+
+
+def test_holes_are_few_and_narrow_and_some_go_through() -> None:
+    through = 0
+    for seed in range(60):
+        body = KINDS["drilled"][0](np.random.default_rng([1, seed]))
+        through += body.genus() > 0
+    assert through > 20
+
+
+@given(seed=st.integers(0, 2**32 - 1), long_m=st.floats(0.01, 0.2))
+def test_a_drill_is_narrower_than_a_pad(seed: int, long_m: float) -> None:
+    tool = fine_structure._drill(long_m, np.random.default_rng(seed))
+    assert 0.7 * 0.0015**2 < tool.volume() / long_m < 0.007 * 0.07
+    assert tool.bounding_box()[5] == pytest.approx(long_m)
 
 
 @settings(deadline=None, max_examples=30)

@@ -8,7 +8,7 @@ from pipeline.errors import MeshError
 from pipeline.geometry.manifolds import from_manifold
 from pipeline.geometry.mesh import Mesh
 from pipeline.geometry.parametric.solids import Solid
-from pipeline.geometry.random_solids import bodies, household, relief
+from pipeline.geometry.random_solids import bodies, fine_structure, household, relief
 from pipeline.geometry.random_solids.grain import grained
 from pipeline.geometry.random_solids.skins import bent_and_rough, mark
 from pipeline.geometry.shape import mean_thickness
@@ -21,7 +21,7 @@ _MARKED_SHARE = 0.45
 _LEAST_THICKNESS = 0.01  # 2 V / A over the longest extent: a cup with a wall of 1 mm
 _MOST_FACES = 40_000  # a scan has 16 000; more is fine ribs that no camera sees
 _MOST_DRAWS = 50
-KINDS = {**bodies.KINDS, **household.KINDS, **relief.KINDS}
+KINDS = {**bodies.KINDS, **household.KINDS, **relief.KINDS, **fine_structure.KINDS}
 
 
 def random_solid(rng: np.random.Generator, kinds: Sequence[str], grained_share: float) -> Mesh:
