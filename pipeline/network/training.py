@@ -197,9 +197,8 @@ def train(
 
                 with mixed_precision(device, config.precision):
                     predicted = forward(inputs)
-                taught = None
-                if teachers:
-                    taught = taught_by.mean_prediction(inputs, turns[state.batch])
+                asked = turns[state.batch]
+                taught = taught_by.mean_prediction(inputs, asked) if teachers else None
                 loss = training_loss(predicted, quality, taught, config)
                 optimizer.zero_grad(set_to_none=True)
                 # Processes average their gradients: that of the batch's mean is what comes out.

@@ -143,7 +143,7 @@ def test_wings_are_thin_and_reach_far() -> None:
     assert np.median(shares) < 0.6
 
 
-def test_holes_are_few_and_narrow_and_some_go_through() -> None:
+def test_some_holes_go_through() -> None:
     through = 0
     for seed in range(60):
         body = KINDS["drilled"][0](np.random.default_rng([1, seed]))

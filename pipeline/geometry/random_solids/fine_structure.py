@@ -2,8 +2,8 @@
 
 Two kinds beside those of ``bodies``, ``household`` and ``relief``, drawn where
 ``objects.solid_kinds`` names them: toy aeroplanes, propellers and brackets, whose parts a pad
-overhangs; and bodies with a few holes narrower than a cell of the network's input, through which
-a pad leaks. Fine structure was what a network erred most on among scans kept apart from these.
+overhangs; and bodies with a few holes and slits some millimetres wide, through which a pad leaks.
+Holes narrower than a cell of the network's input are not seen in it.
 """
 
 from collections.abc import Callable
@@ -28,6 +28,8 @@ from pipeline.geometry.random_solids.bodies import (
 )
 from pipeline.geometry.random_solids.relief import ringed_body
 
+_FROM_Z = ((0.0, 90.0, 0.0), (90.0, 0.0, 0.0), (0.0, 0.0, 0.0))  # lays z along x, y, z [degrees]
+
 
 def winged_body(rng: np.random.Generator) -> Solid:
     """A long hull with thin plates through it: wings, fins, blades."""
@@ -51,7 +53,7 @@ def winged_body(rng: np.random.Generator) -> Solid:
 
 
 def _wing(long_m: float, rng: np.random.Generator) -> Solid:
-    """A thin plate that rises from z = 0, as wide along x as it is drawn; its tip may be swept."""
+    """A thin plate in the plane y = 0 that rises from z = 0; its tip may be narrower, and swept."""
     span, chord = long_m * rng.uniform(0.2, 0.5), long_m * rng.uniform(0.1, 0.35)
     thick, tip = log_uniform(rng, 0.0015, 0.006), chord * rng.uniform(0.4, 1.0)
     swept = rng.uniform(-0.5, 0.5) * chord
@@ -85,9 +87,6 @@ def drilled_body(rng: np.random.Generator) -> Solid:
         if len(cut.decompose()) == 1:  # a slit may part a thin body
             body = cut
     return body
-
-
-_FROM_Z = ((0.0, 90.0, 0.0), (90.0, 0.0, 0.0), (0.0, 0.0, 0.0))  # turns z into x, y, z [degrees]
 
 
 def _drill(long_m: float, rng: np.random.Generator) -> Solid:
