@@ -136,6 +136,21 @@ def apply_symmetry(
     return moved.reshape(b, c, h, w)
 
 
+def turn_batch(
+    inputs: Float[Tensor, "b c h w"], element: int, channels: Channels = CHANNELS
+) -> Float[Tensor, "b c h w"]:
+    """Turn and mirror a batch for a network to read, all of it by one element (`apply_symmetry`).
+
+    Returns
+    -------
+    The turned and mirrored inputs, shape (b, c, h, w), in memory with channels last.
+    """
+    if element:
+        elements = torch.full((len(inputs),), element, device=inputs.device)
+        inputs = apply_symmetry(inputs, elements, channels)
+    return inputs.contiguous(memory_format=torch.channels_last)
+
+
 def inverse_symmetry(elements: Int[Tensor, " b"]) -> Int[Tensor, " b"]:
     """Element that undoes each, shape (b,): the opposite turn; a mirrored one undoes itself."""
     return torch.where(elements < 4, (4 - elements) % 4, elements)

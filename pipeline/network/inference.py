@@ -4,7 +4,7 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float
 
-from pipeline.network.canonical import apply_symmetry, network_input
+from pipeline.network.canonical import network_input, turn_batch
 from pipeline.network.ga_cnn import GaCnn
 from pipeline.network.input_channels import SYMMETRIES
 from pipeline.network.reproducible import reproducible
@@ -49,10 +49,6 @@ def predict(
             inputs = network_input(
                 torch.from_numpy(cloud[part]), torch.from_numpy(mask[part]), model.channels
             )
-            outputs = []
-            for element in elements:
-                chosen = torch.full((len(inputs),), element)
-                turned = apply_symmetry(inputs, chosen, model.channels) if element else inputs
-                outputs.append(model(turned.contiguous(memory_format=torch.channels_last)))
+            outputs = [model(turn_batch(inputs, g, model.channels)) for g in elements]
             predicted[part] = torch.stack(outputs).mean(dim=0).numpy()
     return predicted

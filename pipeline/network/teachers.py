@@ -17,7 +17,7 @@ from jaxtyping import Float, Int
 from torch import Tensor, nn
 
 from pipeline.config.learning import TrainConfig
-from pipeline.network.canonical import apply_symmetry
+from pipeline.network.canonical import turn_batch
 from pipeline.network.checkpoint import network_of_this_program
 from pipeline.network.devices import Predict, compile_network, mixed_precision
 from pipeline.network.ga_cnn import GaCnn
@@ -79,17 +79,11 @@ class Teachers:
         -------
         Shape (b,).
         """
-        views = [turned(inputs, turn) for turn in turns]
+        views = [turn_batch(inputs, int(turn)) for turn in turns]
         with torch.no_grad(), mixed_precision(self._device, self._config.precision):
             asked = zip(self._networks, views, strict=True)
             told = [network(view).float() for network, view in asked]
         return torch.stack(told).mean(dim=0)
-
-
-def turned(inputs: Float[Tensor, "b c h w"], turn: Int[Tensor, ""]) -> Float[Tensor, "b c h w"]:
-    """A batch of canonical inputs, all turned or mirrored by one element."""
-    elements = turn.expand(len(inputs)).to(inputs.device)
-    return apply_symmetry(inputs, elements).contiguous(memory_format=torch.channels_last)
 
 
 def training_loss(

@@ -11,6 +11,7 @@ from pipeline.network.canonical import (
     inverse_symmetry,
     network_input,
     reference_height,
+    turn_batch,
 )
 from pipeline.network.input_channels import CHANNELS, CHANNELS_0_1, KNOWN_CHANNELS, SYMMETRIES
 from tests.network.planes import CELLS, HALF_SIDE, grid_xy
@@ -63,6 +64,19 @@ def test_the_eight_elements_are_eight() -> None:
     turned = apply_symmetry(inputs, torch.arange(SYMMETRIES))
     assert len({tensor.numpy().tobytes() for tensor in turned}) == SYMMETRIES
     assert torch.equal(turned[0], inputs[0])
+
+
+@pytest.mark.parametrize("channels", KNOWN_CHANNELS)
+@pytest.mark.parametrize("element", range(SYMMETRIES))
+def test_a_whole_batch_turns_as_each_of_it_and_lies_channels_last(
+    element: int, channels: tuple[str, ...]
+) -> None:
+    batch = torch.cat(
+        [network_input(*organised(scattered_points(seed)), channels) for seed in range(3)]
+    )
+    turned = turn_batch(batch, element, channels)
+    assert torch.equal(turned, apply_symmetry(batch, torch.full((3,), element), channels))
+    assert turned.is_contiguous(memory_format=torch.channels_last)
 
 
 @settings(max_examples=25, deadline=None)
