@@ -129,6 +129,7 @@ def summary(parts: Sequence[Part], gathered: Sequence[Gathered], names: Sequence
         "objects": len(names),
         "quality_histogram": {split: counts.tolist() for split, counts in quality.items()},
         "seen_cells": {split: round(share, 4) for split, share in seen.items()},
+        "empty_clouds": {split: sum(g.empty for g in found) for split, found in of.items()},
     }
 
 

@@ -57,6 +57,7 @@ class Gathered:
     quality: Int[np.ndarray, " 10"]  # samples by tenth of q
     seen: int  # cells that hold a point
     cells: int
+    empty: int  # clouds in which none does
     rows_s: float  # processor time of writing its rows
 
 
@@ -110,19 +111,20 @@ def pieces_of(job: GatherJob) -> list[tuple[Path, int, int]]:
 
 def counted(job: GatherJob, batches: Iterable[Samples]) -> Gathered:
     """A part's entries in the index, and counts of its samples; their rows are written."""
-    quality, seen, cells = np.zeros(TENTHS, dtype=np.int64), 0, 0
+    quality, seen, cells, empty = np.zeros(TENTHS, dtype=np.int64), 0, 0, 0
     rows, first, split, writing = [], job.part.first, job.part.split, Stopwatch()
     for batch in batches:
         quality += quality_histogram(batch.quality.astype(np.float64))
         seen += int(np.count_nonzero(batch.cloud_mask))
         cells += batch.cloud_mask.size
+        empty += int(np.count_nonzero(~batch.cloud_mask.reshape(len(batch), -1).any(axis=1)))
         with writing.running():
             rows.append(sample_part(batch, job.names, split, first))
         first += len(batch)
     with writing.running():
         publish_rows(job.rows, "samples", rows)
     entries = [shard_entry(path, job.below, size, split) for path, _, size in pieces_of(job)]
-    return Gathered(entries, quality, seen, cells, writing.seconds)
+    return Gathered(entries, quality, seen, cells, empty, writing.seconds)
 
 
 def read_shard(path: Path) -> Iterator[Samples]:

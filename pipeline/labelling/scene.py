@@ -77,7 +77,7 @@ def label_scene(
     Raises
     ------
     SceneError
-        No camera sees a surface face on and whole in its picture.
+        No camera sees a surface face on, whole in its picture and within its range.
     """
     names = tuple(sorted({item.object_name for item in scene.objects}))
     disturbed = config.sensing.disturbed
@@ -90,7 +90,8 @@ def label_scene(
     ]
     if not able:
         raise SceneError(
-            f"No camera of scene {scene.scene_id} sees a surface face on and whole in its picture",
+            f"No camera of scene {scene.scene_id} sees a surface face on, whole in its picture and "
+            "neither nearer nor farther than it measures",
             "Raise grasps.seen_angle_max_rad, or change where the cameras stand",
         )
     index_of_body = np.zeros(1 + max(item.body_id for item in scene.objects), dtype=np.int64)
@@ -129,7 +130,7 @@ def visible_surface(view: CameraView, surfaces: RayScene, radius_m: float) -> Vi
     surfaces
         The true surfaces; the table is body 0.
     radius_m
-        Radius around a contact within which the picture must show the scene, r_G [m].
+        Radius around a contact within which the camera must measure the scene, r_G [m].
 
     Returns
     -------

@@ -324,10 +324,10 @@ def thinned(camera: PinholeCamera, every: int) -> PinholeCamera:
 def shown_whole(
     camera: PinholeCamera, points_m: Float[np.ndarray, "n 3"], radius_m: float
 ) -> Bool[np.ndarray, " n"]:
-    """Whether a sphere around each point lies completely within the camera's field of view.
+    """Whether a sphere around each point lies completely within what the camera measures.
 
-    The field of view is a pyramid. A sphere lies in it where its centre is at least the radius
-    inside each of the four faces.
+    That is the pyramid of its field of view, from ``near_m`` to ``far_m``. A sphere lies in it
+    where its centre is at least the radius inside each of the six faces.
 
     Parameters
     ----------
@@ -349,4 +349,7 @@ def shown_whole(
     inward = np.array([[1.0, 0, left], [-1.0, 0, right], [0, 1.0, top], [0, -1.0, bottom]])
     inward /= np.linalg.norm(inward, axis=1, keepdims=True)
     in_camera = transform_points(invert(camera.world_from_camera), points_m)
-    return np.asarray((in_camera @ inward.T >= radius_m).all(axis=1))
+    in_sight = (in_camera @ inward.T >= radius_m).all(axis=1)
+    depth_m = in_camera[:, 2]
+    in_range = (depth_m - radius_m >= camera.near_m) & (depth_m + radius_m <= camera.far_m)
+    return np.asarray(in_sight & in_range)

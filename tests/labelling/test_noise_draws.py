@@ -1,23 +1,15 @@
 """Each label of a training scene serves several clouds, each with noise of its own."""
 
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-import trimesh
 
 from pipeline.config import RunConfig
-from pipeline.geometry.transforms import frame_from_z, look_at
 from pipeline.labelling.grasps import LabelledGrasps
-from pipeline.labelling.scene import label_scene, scene_surfaces
-from pipeline.world.cameras import PinholeCamera, pixel_rays
-from pipeline.world.posed_bodies import TABLE
-from pipeline.world.scene import ClutterScene, PlacedObject
-from pipeline.world.view import CameraView
-from tests.bodies import mesh_of
+from pipeline.labelling.scene import label_scene
+from tests.labelling.ball import scene_of_a_ball
 
 DRAWS = 3
-WIDTH_PX, HEIGHT_PX = 128, 96
 
 
 @lru_cache
@@ -27,21 +19,8 @@ def labelled(split: str, draws: int, shared_by: int = 0) -> list[LabelledGrasps]
     config = RunConfig.model_validate(
         {"grasps": {"merged_share": 0.0, "oversampling": 1.0, **drawn}}
     )
-    ball = mesh_of(trimesh.creation.icosphere(subdivisions=3, radius=0.045))
-    placed = PlacedObject("ball", 1, frame_from_z(np.array([0, 0, 0.045]), np.array([0, 0, 1.0])))
-    scene = ClutterScene("one", 1, split, 0, (placed,), np.full(1, np.inf), (), 0.0, ())
-    surfaces = scene_surfaces(scene, {"ball": ball}, config.scenes.table_side_m)
-    k = np.array([[130.0, 0, WIDTH_PX / 2], [0, 130.0, HEIGHT_PX / 2], [0, 0, 1.0]])
-    pose = look_at(np.array([0.05, -0.1, 0.6]), np.zeros(3))
-    camera = PinholeCamera("one", WIDTH_PX, HEIGHT_PX, k, pose, "lidar", 0.25, 9.0)
-    origin, rays = pixel_rays(camera, np.ones((HEIGHT_PX, WIDTH_PX), dtype=bool))
-    hits = surfaces.cast(np.broadcast_to(origin, rays.shape), rays)
-    depth_m = (hits.distance_m * (rays @ pose[:3, 2])).reshape(HEIGHT_PX, WIDTH_PX)
-    facing = np.broadcast_to(np.array([128, 128, 1], dtype=np.uint8), (HEIGHT_PX, WIDTH_PX, 3))
-    body = np.maximum(hits.body, TABLE).reshape(HEIGHT_PX, WIDTH_PX).astype(np.uint16)
-    colour = np.zeros((HEIGHT_PX, WIDTH_PX, 3), dtype=np.uint8)
-    seen = replace(scene, views=(CameraView(camera, depth_m, colour, body, facing),))
-    batches = label_scene(seen, surfaces, config, 30, np.random.default_rng(0))
+    scene, surfaces = scene_of_a_ball(split)
+    batches = label_scene(scene, surfaces, config, 30, np.random.default_rng(0))
     return [grasps for _, grasps in batches]
 
 

@@ -117,18 +117,21 @@ def test_pose_and_intrinsics_cannot_be_written_to() -> None:
             array[0, 0] = 2.0
 
 
-def test_shown_whole_is_a_ball_whose_every_point_is_in_the_picture() -> None:
-    """Against the picture's own projection of points all over each ball."""
+@pytest.mark.parametrize(("near_m", "far_m"), [(0.5, 4.5), (0.85, 4.5), (0.5, 0.9)])
+def test_shown_whole_is_a_ball_whose_every_point_is_measured(near_m: float, far_m: float) -> None:
+    """Against the picture's own projection of points all over each ball, and their depths."""
     rng = np.random.default_rng(3)
     centres, radius = rng.uniform(-0.7, 0.7, (400, 3)) * [1, 1, 0.2], 0.04
     shell = rng.normal(size=(3000, 3))
     shell *= radius / np.linalg.norm(shell, axis=1, keepdims=True)
     (camera,) = static_cameras(StaticCameraConfig())
+    camera = replace(camera, near_m=near_m, far_m=far_m)
     world = centres[:, None] + shell
     local = transform_points(invert(camera.world_from_camera), world.reshape(-1, 3))
     pixels = local @ camera.intrinsics.T
     column, row = (pixels[:, i] / pixels[:, 2] for i in (0, 1))
     inside = (column >= 0) & (column <= camera.width_px) & (row >= 0) & (row <= camera.height_px)
+    inside &= (local[:, 2] >= near_m) & (local[:, 2] <= far_m)
     whole = inside.reshape(len(centres), -1).all(axis=1)
     found = shown_whole(camera, centres, radius)
     assert 0.1 < whole.mean() < 0.9
