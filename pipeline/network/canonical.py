@@ -141,6 +141,15 @@ def turn_batch(
 ) -> Float[Tensor, "b c h w"]:
     """Turn and mirror a batch for a network to read, all of it by one element (`apply_symmetry`).
 
+    Parameters
+    ----------
+    inputs
+        Canonical inputs on a square grid, shape (b, c, h, w) with h = w.
+    element
+        In [0, 8); 0 leaves the inputs as they are.
+    channels
+        Names of the c channels, one of ``KNOWN_CHANNELS``.
+
     Returns
     -------
     The turned and mirrored inputs, shape (b, c, h, w), in memory with channels last.
