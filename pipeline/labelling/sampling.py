@@ -49,7 +49,7 @@ class VisibleSurface:
     eye_m
         Position of the camera [m], shape (3,).
     whole
-        Whether the picture shows everything within r_G of the point, shape (n,).
+        Whether the camera measures everything within r_G of the point, shape (n,).
     """
 
     points_m: Float[np.ndarray, "n 3"]

@@ -139,7 +139,7 @@ def apply_symmetry(
 def turn_batch(
     inputs: Float[Tensor, "b c h w"], element: int, channels: Channels = CHANNELS
 ) -> Float[Tensor, "b c h w"]:
-    """Turn and mirror a batch for a network to read, all of it by one element (`apply_symmetry`).
+    """Turn and mirror a whole batch by one element (see `apply_symmetry`), as a network reads it.
 
     Parameters
     ----------

@@ -5,7 +5,7 @@ import pickle
 import shutil
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TypeVar
 
@@ -107,6 +107,19 @@ def test_a_split_of_one_part_keeps_the_order_of_one_permutation(done: StageConte
     np.testing.assert_array_equal(
         read_split(done.output, "val").quality, samples.take(order).quality
     )
+
+
+def test_clouds_without_a_point_are_counted(done: StageContext, tmp_path: Path) -> None:
+    part = plan_shuffle(done.config, done.upstream("grasps"), done.shards).parts[0]
+    samples = read_split(done.output, part.split).take(slice(0, part.samples))
+    mask = np.ones_like(samples.cloud_mask)
+    mask[[2, 5]] = False
+    mask[7, 1:] = False
+    names = read_all_grasps(done.upstream("grasps"))[0]
+    below, rows = done.output.parent, tmp_path / "rows.arrow"
+    job = shuffling.GatherJob(part, (), names, done.config, done.provenance(), below, rows)
+    found = shuffling.counted(job, [replace(samples, cloud_mask=mask)])
+    assert (found.empty, found.seen, found.cells) == (2, int(mask.sum()), mask.size)
 
 
 def test_jobs_done_elsewhere_in_any_order_write_the_same_bytes(
