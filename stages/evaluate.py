@@ -4,6 +4,7 @@ import os
 import shutil
 import sys
 from collections.abc import Iterable, Sequence
+from itertools import groupby, islice
 
 from google.protobuf.message import Message
 
@@ -76,16 +77,21 @@ def clutters(stage: StageContext, every_scene: Sequence[ClutterScene]) -> list[C
 
     Returns
     -------
-    Those of the evaluated split from the first wanted number on, in the same order.
+    Those of the evaluated split from the first wanted number on, of each level no more than are
+    wanted, in the same order.
 
     Raises
     ------
     ArtifactError
         There is none.
     """
-    split, first = stage.config.evaluate.split, stage.config.evaluate.clutters_from
+    wanted = stage.config.evaluate
+    split, first, most = wanted.split, wanted.clutters_from, wanted.clutters_per_level
     of_split = [scene for scene in every_scene if scene.split == split]
     scenes = [scene for scene in of_split if clutter_number(scene.scene_id) >= first]
+    if most:
+        by_level = groupby(scenes, key=lambda scene: scene.level)
+        scenes = [scene for _, of_level in by_level for scene in islice(of_level, most)]
     if not scenes:
         raise ArtifactError(
             f"{stage.upstream('scenes')} holds no {split} clutter from number {first} on",

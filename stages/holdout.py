@@ -22,11 +22,17 @@ from pipeline.config import RunConfig, load_run_config
 from pipeline.config.judged import holdout_config
 from pipeline.config.written import as_toml
 from pipeline.errors import ArtifactError
-from pipeline.execution import RunFolder, run_command
+from pipeline.execution import RunFolder, generator, run_command
 from pipeline.execution.running import read_summary
 from pipeline.messages.grasp_samples import read_all_grasps
 from pipeline.messages.training import EXPORT
-from pipeline.network.by_object import ObjectError, check_labels, errors_by_object, macro_error
+from pipeline.network.by_object import (
+    ObjectError,
+    check_labels,
+    errors_by_object,
+    interval_of_mean,
+    macro_error,
+)
 from pipeline.network.control_inference import ControlPredictor
 from pipeline.network.figures import mean_absolute_error, weighted_error
 from pipeline.network.fitted_baselines import errors_without_training
@@ -96,6 +102,9 @@ def measure(run: RunName = "default", runs_dir: RunsDir = RUNS_DIR) -> None:
         averaged,
         samples.proposal_weight,
     )
+    gripped = [one.mae for one in errors if one.graspable]
+    rng = generator(config.seed, NAME)
+    interval = interval_of_mean(gripped, config.holdout.resamples, rng)
     figures = {
         "network": json.loads((folder.path / NOTE).read_text())["name"],
         "grasps": len(samples),
@@ -105,6 +114,7 @@ def measure(run: RunName = "default", runs_dir: RunsDir = RUNS_DIR) -> None:
         "mae_as_proposed": weighted_error(single, samples.quality, samples.proposal_weight),
         "mae_macro": macro_error(errors, graspable_alone=False),
         "mae_macro_graspable": macro_error(errors, graspable_alone=True),
+        "mae_macro_graspable_interval_95": interval,
         "best_constant_mae": float(np.abs(samples.quality - np.median(samples.quality)).mean()),
         "baselines": baselines(samples, config),
         **told_by_stages(folder, errors),

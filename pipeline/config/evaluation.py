@@ -193,6 +193,9 @@ class EvaluateConfig(Section):
         description="number of the first clutter of each level that is picked: those before it "
         "were looked at while the policy was made",
     )
+    clutters_per_level: int = Field(
+        0, ge=0, description="clutters of each level that are picked, from that one on; 0: all"
+    )
     policies: tuple[PolicyName, ...] = Field(
         ("closed-loop", "analytic", "uncorrected", "one-seal", "open-loop", "geometric"),
         min_length=1,

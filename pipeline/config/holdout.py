@@ -14,11 +14,19 @@ class HoldoutConfig(Section):
         min_length=1,
         description="clutter levels, Table II; those that the meshes cannot make are left out",
     )
-    clutters_per_level: int = Field(2, ge=1, description="clutters of each level")
+    clutters_per_level: int = Field(
+        2, ge=1, description="clutters of each level that the policies empty"
+    )
+    labelled_clutters_per_level: int = Field(
+        10,
+        ge=1,
+        description="clutters of each level whose grasps are labelled, the emptied ones among "
+        "them: by two a level, the mean over objects strays by 0.003 with the clutters drawn",
+    )
     placement_attempts: int = Field(
         20, ge=1, description="tries at one clutter before it is left out"
     )
-    labelled: int = Field(9000, ge=1, description="grasps labelled, over all clutters")
+    labelled: int = Field(45_000, ge=1, description="grasps labelled, over all clutters")
     policies: tuple[PolicyName, ...] = Field(
         ("closed-loop",), min_length=1, description="policies that empty the clutters"
     )
@@ -28,6 +36,9 @@ class HoldoutConfig(Section):
         le=100_000,
         description="evaluate.ceiling.poses of these clutters: what of the meshes can be lifted "
         "at all, at several times the time; 0: not told",
+    )
+    resamples: int = Field(
+        2000, ge=100, description="bootstrap resamples of the objects, for the intervals"
     )
     baseline_grasps: int = Field(
         1000, ge=0, description="of the grasps, those that the released baseline is asked for too"

@@ -54,6 +54,7 @@ def holdout_config(config: RunConfig) -> RunConfig:
     names; and success over the size of the robot's errors, which tells of policies, not of meshes.
     """
     wanted = config.holdout
+    made = max(wanted.clutters_per_level, wanted.labelled_clutters_per_level)
     return config.model_copy(
         update={
             "objects": config.objects.model_copy(
@@ -75,7 +76,7 @@ def holdout_config(config: RunConfig) -> RunConfig:
                     "splits": ("test",),
                     "impossible": "left out",
                     "placement_attempts": wanted.placement_attempts,
-                    "clutters_per_level": ClutterCounts(test=wanted.clutters_per_level),
+                    "clutters_per_level": ClutterCounts(test=made),
                 }
             ),
             "grasps": config.grasps.model_copy(update={"count": wanted.labelled} | SHARED_OUT),
@@ -83,6 +84,8 @@ def holdout_config(config: RunConfig) -> RunConfig:
             "evaluate": config.evaluate.model_copy(
                 update={
                     "split": "test",
+                    "clutters_from": 0,
+                    "clutters_per_level": wanted.clutters_per_level,
                     "policies": wanted.policies,
                     "ceiling": config.evaluate.ceiling.model_copy(
                         update={"poses": wanted.ceiling_poses}

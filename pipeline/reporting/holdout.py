@@ -8,12 +8,15 @@ from pipeline.reporting.page import cell
 
 def as_markdown(figures: Mapping[str, Any]) -> str:
     """The errors, by object too, and the closed loop by level."""
+    ends = figures["mae_macro_graspable_interval_95"]
+    interval = f" (95 %: {ends[0]:.4f} to {ends[1]:.4f}, bootstrap over them)" if ends else ""
+    gripped = f"one prediction, mean over objects that can be gripped{interval}"
     errors = [
         ("eight predictions averaged, all grasps", figures["mae"]),
         ("one prediction a grasp, all grasps", figures["mae_single"]),
         ("the same over grasps as first proposed", figures["mae_as_proposed"]),
         ("one prediction, mean over objects", figures["mae_macro"]),
-        ("one prediction, mean over objects that can be gripped", figures["mae_macro_graspable"]),
+        (gripped, figures["mae_macro_graspable"]),
         ("the best constant, all grasps", figures["best_constant_mae"]),
         *((f"{name}, some of the grasps", error) for name, error in figures["baselines"].items()),
     ]

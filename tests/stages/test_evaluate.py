@@ -45,6 +45,34 @@ def test_the_first_clutters_of_a_level_may_be_left_out(run: RunFolder) -> None:
         clutters(replace(context, config=config), read_unseen_scenes(run.artifact("scenes")))
 
 
+def test_so_many_clutters_of_each_level_are_picked(run: RunFolder) -> None:
+    """From the first wanted number on, those that there are."""
+    context = stage_context(EVALUATE, run, inputs_of, None, workers=1)
+    made = read_unseen_scenes(run.artifact("scenes"))
+    one = next(scene for scene in made if scene.split == "test")
+    # Of level 1 the clutter of number 0 could not be built.
+    numbers = {1: (1, 2, 3), 2: (0, 1, 2), 3: (0,)}
+    scenes = [
+        replace(one, level=level, scene_id=f"level{level}-test-{number:02d}")
+        for level, of_level in numbers.items()
+        for number in of_level
+    ]
+    for most, first, picked in (
+        (2, 0, {1: (1, 2), 2: (0, 1), 3: (0,)}),
+        (1, 2, {1: (2,), 2: (2,)}),
+        (0, 0, numbers),
+    ):
+        wanted = {"clutters_per_level": most, "clutters_from": first}
+        evaluate = context.config.evaluate.model_copy(update=wanted)
+        config = context.config.model_copy(update={"evaluate": evaluate})
+        found = clutters(replace(context, config=config), scenes)
+        assert [scene.scene_id for scene in found] == [
+            f"level{level}-test-{number:02d}"
+            for level, of_level in picked.items()
+            for number in of_level
+        ]
+
+
 @dataclass(frozen=True)
 class Rating:
     """What rates grasps in a run: some samples, and the baseline fitted to its train split."""

@@ -56,6 +56,16 @@ def test_what_tells_of_policies_and_not_of_meshes_is_left_out(made: RunFolder) -
     assert load_run_config(made.config).evaluate.policies == ("closed-loop",)
 
 
+def test_grasps_are_labelled_in_more_clutters_than_are_emptied() -> None:
+    config = load_run_config(ROOT / "runs" / "paper" / "run.toml")
+    own = holdout_config(config)
+    assert own.scenes.clutters_per_level.test == config.holdout.labelled_clutters_per_level == 10
+    assert own.evaluate.clutters_per_level == config.holdout.clutters_per_level == 2
+    fewer = config.holdout.model_copy(update={"clutters_per_level": 12})
+    emptied = holdout_config(config.model_copy(update={"holdout": fewer}))
+    assert emptied.scenes.clutters_per_level.test == emptied.evaluate.clutters_per_level == 12
+
+
 def test_figures_are_of_one_prediction_and_of_eight(made: RunFolder) -> None:
     figures = json.loads(made.summary("holdout").read_text())
     rows = list(csv.DictReader((made.path / "holdout.csv").open()))
@@ -71,6 +81,11 @@ def test_figures_are_of_one_prediction_and_of_eight(made: RunFolder) -> None:
     assert figures["mae_macro"] == pytest.approx(np.mean(errors))
     own = [one["mae"] for one in figures["by_object"].values() if one["mean_q"] > 0.1]
     assert figures["mae_macro_graspable"] == (pytest.approx(np.mean(own)) if own else None)
+    ends = figures["mae_macro_graspable_interval_95"]
+    if len(own) < 2:
+        assert ends is None
+    else:
+        assert min(own) <= ends[0] <= figures["mae_macro_graspable"] <= ends[1] <= max(own)
     assert set(figures["by_object"]) == {row["object"] for row in rows}
     assert set(figures["success_by_level"]) == {"1"}
     text = (made.path / "holdout.md").read_text()
