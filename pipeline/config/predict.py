@@ -169,7 +169,7 @@ class PredictConfig(Section):
         description="the same as a share of the distance from the camera, whichever is more [1]",
     )
     quality_min: float = Field(
-        0.68,
+        0.69,
         ge=0,
         le=1,
         description="under this q-hat no grasp is called good; `make calibrate` chose it for the "
