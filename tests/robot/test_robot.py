@@ -72,12 +72,15 @@ def test_contacts_are_logged_with_what_was_measured_around_them(
     logged: tuple[Path, list[Attempt]],
 ) -> None:
     lifted, failed = logged[1]
-    (tried,) = lifted.contacts
+    # Both boxes are flat, so which one is rated best is a matter of thousandths.
+    *refused, tried = lifted.contacts
     assert tried.held
     assert tried.lifted
-    assert len(failed.contacts) == failed.seals == failed.regrasps + 1
-    assert not any(one.held or one.lifted for one in failed.contacts)
-    for one in (tried, *failed.contacts):
+    for attempt in (lifted, failed):
+        assert len(attempt.contacts) == attempt.seals == attempt.regrasps + 1
+    refused += failed.contacts
+    assert not any(one.held or one.lifted for one in refused)
+    for one in (tried, *refused):
         mask = from_tensor(one.cloud_mask).astype(bool)
         cloud = from_tensor(one.cloud).astype(np.float64)
         assert mask.mean() > 0.9
