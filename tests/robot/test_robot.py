@@ -80,6 +80,9 @@ def test_contacts_are_logged_with_what_was_measured_around_them(
         assert len(attempt.contacts) == attempt.seals == attempt.regrasps + 1
     refused += failed.contacts
     assert not any(one.held or one.lifted for one in refused)
+    tops_m = [from_tensor(one.world_from_contact)[2, 3] for one in (tried, *refused)]
+    # The smooth box alone is held: every contact that was not lies on the porous one.
+    assert tops_m == pytest.approx([0.06] + [0.04] * len(refused), abs=0.002)
     for one in (tried, *refused):
         mask = from_tensor(one.cloud_mask).astype(bool)
         cloud = from_tensor(one.cloud).astype(np.float64)

@@ -61,6 +61,9 @@ def test_grasps_are_labelled_in_more_clutters_than_are_emptied() -> None:
     own = holdout_config(config)
     assert own.scenes.clutters_per_level.test == config.holdout.labelled_clutters_per_level == 10
     assert own.evaluate.clutters_per_level == config.holdout.clutters_per_level == 2
+    # Clutters that a run passes over are of its own meshes.
+    later = config.evaluate.model_copy(update={"clutters_from": 5})
+    assert holdout_config(config.model_copy(update={"evaluate": later})).evaluate.clutters_from == 0
     fewer = config.holdout.model_copy(update={"clutters_per_level": 12})
     emptied = holdout_config(config.model_copy(update={"holdout": fewer}))
     assert emptied.scenes.clutters_per_level.test == emptied.evaluate.clutters_per_level == 12
